@@ -38,7 +38,8 @@ def step(seconds):
 
 
 def read_camera():
-    """The newest image: when, and its bytes. Called fifty times a second at most."""
+    """Waits for the camera's next image: when it was, and its bytes. This camera takes 30 ms."""
+    time.sleep(0.03)
     row = bytes(x % 256 for x in range(WIDTH))
     return time.monotonic(), row * HEIGHT
 
@@ -51,9 +52,22 @@ def halt(why):
         motion = None
 
 
+def look():
+    """Answers `next_image`. A thread of its own, and without the lock while the camera works: states and pongs go on. What
+    takes long to load is loaded here or in `work`, after `hello` is answered."""
+    global wanted
+    while True:
+        stamp, data = read_camera()
+        with lock:
+            if wanted is not None and (wanted["after"] is None or stamp > wanted["after"]):
+                send({"type": "image", "id": wanted["id"], "stamp": stamp, "stamp_uncertainty_s": 0.01, "width": WIDTH,
+                      "height": HEIGHT, "encoding": "mono8", "bytes": len(data)}, data)
+                wanted = None
+
+
 def work():
-    """Reports the robot, moves it, and answers `next_image`, fifty times a second."""
-    global armed, motion, wanted
+    """Reports the robot and moves it, fifty times a second."""
+    global armed, motion
     while True:
         time.sleep(0.02)
         with lock:
@@ -61,18 +75,14 @@ def work():
                 continue
             if time.monotonic() - heard > 1.0:
                 halt("nothing was heard of the workbench")
+                if armed:
+                    send({"type": "disarmed", "why": "nothing was heard of the workbench for a second"})
                 armed = False
             arrived = motion is not None and step(0.02)
             answer, motion = motion, None if arrived else motion
             send({"type": "state", **read_robot()})
             if arrived:
                 send({"type": "done", "id": answer["id"]})
-            if wanted is not None:
-                stamp, data = read_camera()
-                if wanted["after"] is None or stamp > wanted["after"]:
-                    send({"type": "image", "id": wanted["id"], "stamp": stamp, "stamp_uncertainty_s": 0.01, "width": WIDTH,
-                          "height": HEIGHT, "encoding": "mono8", "bytes": len(data)}, data)
-                    wanted = None
 
 
 def hear(message):
@@ -104,6 +114,7 @@ def hear(message):
 
 
 threading.Thread(target=work, daemon=True).start()
+threading.Thread(target=look, daemon=True).start()
 for line in sys.stdin.buffer:  # ends when the workbench closes it
     with lock:
         heard = time.monotonic()
@@ -120,7 +131,7 @@ with lock:
 #   config.enable_stream(rs.stream.color, 640, 480, rs.format.rgb8, 30)
 #   config.enable_stream(rs.stream.depth, 640, 480, rs.format.z16, 30)
 #   unit_mm = 1000 * pipeline.start(config).get_device().first_depth_sensor().get_depth_scale()
-#   frames = align.process(pipeline.wait_for_frames(1000))     # in a thread of its own, not under `lock`
+#   frames = align.process(pipeline.wait_for_frames(1000))
 #   stamp = time.monotonic() - (time.time() - frames.get_timestamp() / 1000)   # global time of the camera, in ms of the host
 #   data = bytes(frames.get_color_frame().get_data())          # "rgb8"
 #   depth = bytes(frames.get_depth_frame().get_data())         # "u16_mm" where unit_mm is 1

@@ -376,4 +376,6 @@ impl App {
 }
 
 #[cfg(test)]
+mod reasons_tests;
+#[cfg(test)]
 mod tests;

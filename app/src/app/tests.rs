@@ -22,12 +22,12 @@ use crate::model::{
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
 
-struct Bench {
-    app: App,
+pub(super) struct Bench {
+    pub app: App,
     _sessions: tempfile::TempDir,
 }
 
-fn bench(cell: &FakeCell) -> Bench {
+pub(super) fn bench(cell: &FakeCell) -> Bench {
     let cell = cell.clone();
     bench_with(Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>))
 }
@@ -257,7 +257,7 @@ fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_c
 }
 
 /// The pose that is next is chosen as a worker chooses it.
-fn choose(app: &mut App) {
+pub(super) fn choose(app: &mut App) {
     let id = app.numbers.motion;
     let guided = app.model.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("a guided sequence");
     guided.waits = Waits::Choice;
@@ -277,7 +277,7 @@ fn choose(app: &mut App) {
     app.absorb(Event::Guided { id, outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3), chosen_at })) });
 }
 
-fn waits(app: &App) -> Option<Waits> {
+pub(super) fn waits(app: &App) -> Option<Waits> {
     app.model().sequence.as_ref().and_then(|it| it.guided.as_deref()).map(|guided| guided.waits)
 }
 

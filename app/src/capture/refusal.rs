@@ -80,12 +80,12 @@ pub fn no_board(target: &TargetSpec) -> Why {
     (RefusalKind::NoBoard, why)
 }
 
-/// Images come, and the robot is not known where it was.
-pub fn no_pose() -> Why {
-    let why = text!(
-        "Where the robot was in the image is not known: type the pose that its pendant shows, or look into the messages for \
-         what its driver says, and capture again"
-    );
+/// Images come, and where the robot was is not known, for this reason.
+pub fn no_pose(why: Option<&Text>) -> Why {
+    let why = match why {
+        Some(why) => text!("Where the robot was in the image is not known: {why}", why = why.clone()),
+        None => text!("Where the robot was in the image is not known"),
+    };
     (RefusalKind::NoImages, why)
 }
 

@@ -22,8 +22,8 @@ pub struct Sequence {
     machine: Machine,
     /// What belongs to the last image that was taken in.
     last: Option<(Pose<Base, Tip>, FrameInfo)>,
-    /// The newest image came without a pose of the robot.
-    lacks_pose: bool,
+    /// Why there is no capture where the newest image came without a pose of the robot.
+    lacks_pose: Option<Why>,
 }
 
 impl Sequence {
@@ -32,7 +32,7 @@ impl Sequence {
         let CaptureOptions { frames, least_distance_m, least_angle_rad, settle_limit_s } = request.options;
         let others = request.others.clone();
         let plan = Plan { frames, settle_limit_s, least_distance_m, least_angle_rad, others };
-        Self { request, target, machine: Machine::new(plan, now_s), last: None, lacks_pose: false }
+        Self { request, target, machine: Machine::new(plan, now_s), last: None, lacks_pose: None }
     }
 
     /// The number of the request.
@@ -43,7 +43,7 @@ impl Sequence {
     /// Takes in an image; whether it was the last that is needed.
     pub fn see(&mut self, frame: &LiveFrame, grey: &GrayImage) -> bool {
         let LiveFrame { info, images } = frame;
-        self.lacks_pose = info.base_from_tip.is_none();
+        self.lacks_pose = info.base_from_tip.is_none().then(|| refusal::no_pose(info.no_pose.as_deref()));
         let Some(base_from_tip) = info.base_from_tip else { return self.is_complete() };
         let shot = Shot {
             number: info.number,
@@ -90,8 +90,10 @@ impl Sequence {
         match self.machine.progress() {
             Progress::Waits(wait) => Ok(CaptureWait::Images(wait)),
             Progress::Complete => Ok(CaptureWait::Measuring),
-            Progress::Refused(Refusal::NoImages | Refusal::Paused) if self.lacks_pose => Err(refusal::no_pose()),
-            Progress::Refused(why) => Err(refusal::of_machine(&why)),
+            Progress::Refused(why) => Err(match (&self.lacks_pose, why) {
+                (Some(no_pose), Refusal::NoImages | Refusal::Paused) => no_pose.clone(),
+                _ => refusal::of_machine(&why),
+            }),
         }
     }
 

@@ -12,7 +12,7 @@ use handeye_core::targets::TargetSpec;
 use super::drawn::{BOARD, board, brighter_board};
 use super::{CaptureEnd, CaptureRequest, Images, take};
 use crate::model::{CaptureOptions, CapturePurpose, ColouredDepth, FrameImages, FrameInfo, LiveFrame, RefusalKind};
-use crate::text::Language;
+use crate::text::{Language, Text};
 
 /// One image after the other, a pass apart.
 struct Reel<F> {
@@ -20,11 +20,13 @@ struct Reel<F> {
     number: u64,
     pass_s: f64,
     now_s: Cell<f64>,
+    /// Why no image has a pose.
+    no_pose: Option<Text>,
 }
 
 impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Reel<F> {
     fn new(rgb: F) -> Self {
-        Self { rgb, number: 0, pass_s: 0.05, now_s: Cell::new(100.0) }
+        Self { rgb, number: 0, pass_s: 0.05, now_s: Cell::new(100.0), no_pose: None }
     }
 }
 
@@ -42,11 +44,13 @@ impl<F: FnMut(u64) -> Result<RgbImage, &'static str>> Images for Reel<F> {
             number: self.number,
             sim_time_s: self.number as f64 * self.pass_s,
             image_age_s: 0.0,
+            image_off_m: 0.0,
+            no_pose: self.no_pose.clone().map(Box::new),
             received_s: self.now_s.get(),
             rate_hz: 0.0,
             depth_range_m: [0.1, 3.5],
             far_plane_m: 3.5,
-            base_from_tip: Some(Pose::identity()),
+            base_from_tip: self.no_pose.is_none().then(Pose::identity),
             joints_rad: [0.0; 6].into(),
             base_from_target_true: None,
             clocks: None,
@@ -130,8 +134,18 @@ fn a_simulation_without_time_ends_the_capture() {
         let (kind, why) = refused(take_all(request(1), &BOARD, &mut reel));
         assert_eq!(kind, RefusalKind::Paused);
         assert!(why.contains("paused"), "{why}");
-        assert!(reel.number < 40, "{} images in {} s", reel.number, reel.now_s.get() - 100.0);
+        assert!(reel.number < 70, "{} images in {} s", reel.number, reel.now_s.get() - 100.0);
     }
+}
+
+#[test]
+fn images_without_a_pose_of_the_robot_end_the_capture_with_the_reason_that_its_driver_gives() {
+    let sharp = board(0);
+    let why = Text::verbatim("its states before and after the image are 0.400 s apart");
+    let mut reel = Reel { no_pose: Some(why), ..Reel::new(|_| Ok(sharp.clone())) };
+    let (kind, said) = refused(take_all(request(1), &BOARD, &mut reel));
+    assert_eq!(kind, RefusalKind::NoImages);
+    assert!(said.contains("0.400 s apart") && !said.contains("pendant") && !said.contains("paused"), "{said}");
 }
 
 #[test]

@@ -30,7 +30,7 @@ impl App {
         let has_begun = asked.is_ok();
         self.expect(text!("There is no capture"), asked);
         if !has_begun && self.model.sequence_runs {
-            self.break_off();
+            self.break_off(None);
         }
     }
 

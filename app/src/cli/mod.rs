@@ -14,6 +14,7 @@ mod export;
 mod failure;
 mod gate;
 mod import;
+mod late;
 mod object_arg;
 mod out;
 mod output;

@@ -191,7 +191,8 @@ pub fn folder(
     cancel: &CancelToken,
 ) -> Result<Solution, Failure> {
     let input = read(path, cancel)?;
-    let job = SolveJob { goal_m, truth, ..job(&input, method, options) };
+    let recorded = Some((path.to_path_buf(), Arc::clone(&input.document)));
+    let job = SolveJob { recorded, goal_m, truth, ..job(&input, method, options) };
     let solved = worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path))?;
     Ok(Solution::new(path, input, solved))
 }
@@ -200,7 +201,17 @@ pub fn folder(
 pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
     let SessionObservations { observations, captures, verification } = input.seen.clone();
     let goal_m = Goal::default().0;
-    SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, truth: None }
+    SolveJob {
+        id: JobId(0),
+        observations,
+        captures,
+        verification,
+        recorded: None,
+        method,
+        options,
+        goal_m,
+        truth: None,
+    }
 }
 
 /// Where there is no answer the data may be at fault, and the doctor says which.

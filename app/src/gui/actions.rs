@@ -123,7 +123,7 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
     let blocked = crate::track::pane::Blocked::of(model);
     let may_move = model.is_armed();
     let asks_to_move = matches!(model.moves(), Moves::OnceArmed { .. }) && model.control.is_connected();
-    vec![
+    let mut all = vec![
         with(tr!(language, "Stop the arm"), STOP, Command::Stop, true),
         with(tr!(language, "Capture"), CAPTURE, Command::Capture(CapturePurpose::Calibrate), takes),
         plain(tr!(language, "Capture for verification"), Command::Capture(CapturePurpose::Verify), takes),
@@ -193,14 +193,19 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
             Command::SetFollow(None),
             !matches!(model.track.follow, FollowStatus::Off | FollowStatus::Ended(_)),
         ),
-        plain(tr!(language, "Start simulation"), Command::StartSimulation, model.resting_simulation().is_some()),
         plain(tr!(language, "Try to connect now"), Command::Reconnect, true),
         plain(
             tr!(language, "Stop trying"),
             Command::StopTrying,
             matches!(model.source, CellSource::Drivers(_)) && !model.control.is_connected(),
         ),
-    ]
+    ];
+    // A robot behind a driver has no simulation.
+    if !matches!(model.source, CellSource::Drivers(_)) {
+        let rests = model.resting_simulation().is_some();
+        all.push(plain(tr!(language, "Start simulation"), Command::StartSimulation, rests));
+    }
+    all
 }
 
 /// Undo, and the files of the session.

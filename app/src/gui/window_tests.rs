@@ -7,8 +7,10 @@ use handeye_core::targets::TargetSpec;
 
 use super::*;
 use crate::command::Event;
-use crate::gui::testing::{Silent, connected, frame, robot};
-use crate::model::{CellSource, Drivers, ImagePoint, Link, LinkState, Model, Pane, RotationFormat, Simulation, Step};
+use crate::gui::testing::{Silent, connected, frame, robot, sample};
+use crate::model::{
+    CellSource, Drivers, ImagePoint, Link, LinkState, Model, Moves, Pane, RotationFormat, Simulation, Step,
+};
 use crate::text::{Language, Text};
 
 #[test]
@@ -62,6 +64,38 @@ fn a_driver_that_is_gone_says_why_and_when_it_is_started_again_and_a_person_can_
     assert!(silent.sees("Not connected") && silent.sees("It is not tried again until you ask for it."));
     assert!(silent.harness.query_by_label("Try again now").is_some());
     assert!(silent.harness.query_by_label("Stop trying").is_none());
+}
+
+/// A robot behind a driver is none of a simulator, whatever happens to it.
+#[test]
+fn words_of_a_simulator_stand_nowhere_behind_a_driver() {
+    let drivers = Drivers { robot: Some("python3 my_driver.py".to_owned()), camera: None };
+    let lost = LinkState::Lost { since_s: 90.0, why: Text::verbatim("it ended"), attempt: 1, next_s: 101.0 };
+    for (is_armed, link) in [(true, connected()), (false, connected()), (true, lost)] {
+        let mut silent = Silent::new(CellSource::Drivers(drivers.clone()));
+        let mut model = sample::solved();
+        model.source = CellSource::Drivers(drivers.clone());
+        let cell = model.cell.as_mut().expect("connected");
+        (cell.moves, cell.truth) = (Moves::OnceArmed { joints: true, tip: true }, None);
+        model.robot.as_mut().expect("connected").is_armed = is_armed;
+        silent.app().replace_model(model);
+        silent.links(&link);
+        let none_of_it = |silent: &Silent, place: &str| {
+            for word in ["imulat", "CoppeliaSim"] {
+                assert!(!silent.sees(word), "{word} in {place}, armed {is_armed}");
+            }
+        };
+        // Where another cell is chosen, the simulator is one of them.
+        for pane in Pane::ALL.into_iter().filter(|pane| *pane != Pane::Connect) {
+            silent.show(pane);
+            if !silent.harness.state_mut().layout().is_in_front(Pane::Connect) {
+                none_of_it(&silent, &format!("{pane:?}"));
+            }
+        }
+        silent.press(egui::Modifiers::COMMAND, egui::Key::K);
+        assert!(silent.sees("Stop the arm"), "the palette is open");
+        none_of_it(&silent, "the palette");
+    }
 }
 
 #[test]

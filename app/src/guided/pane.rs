@@ -10,7 +10,7 @@ use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::{Model, Motion, Pane, PoseSequence};
 use crate::motion::pane::unknown_arm;
-use crate::taught::pane::immovable;
+use crate::taught::pane::{immovable, unmovable};
 use crate::text::Text;
 use crate::{text, tr};
 
@@ -77,6 +77,10 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
             confirmation_ui(ui, model, outbox);
         }
     });
+    if let Some(why) = sequence.last_skipped() {
+        let said = text!("The pose before was left out: {why}", why = why.clone());
+        parts::notice_ui(ui, Tone::Warning, &said.say(language), |_| ());
+    }
     if let Some(why) = &guided.why {
         parts::hint_ui(ui, &why.text().say(language));
     }
@@ -87,10 +91,10 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
 /// What a person may do with the pose that waits.
 fn confirmation_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let hindrance = match model.motion {
+    let hindrance = unmovable(model).or_else(|| match model.motion {
         Motion::Idle => None,
         _ => Some(tr!(language, "The arm is moving: wait until it stands, or stop it")),
-    };
+    });
     let words = RichText::new(tr!(language, "Move there")).strong().color(Marks::of(ui).on_accent);
     let button = Button::new(words).fill(Palette::of(ui).accent);
     let what = tr!(

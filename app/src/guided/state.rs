@@ -35,6 +35,10 @@ pub struct GuidedProgress {
     pub checked: usize,
     /// Poses that were tried for that.
     pub tried: usize,
+    /// Moves in a row that the robot did not begin.
+    pub refused_moves: usize,
+    /// It has come to its end, and there is nothing to go on with.
+    pub is_over: bool,
 }
 
 /// What a guided sequence waits for.
@@ -64,6 +68,8 @@ impl GuidedProgress {
             ending: None,
             checked: 0,
             tried: 0,
+            refused_moves: 0,
+            is_over: false,
         }
     }
 }

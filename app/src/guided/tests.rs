@@ -6,10 +6,10 @@ use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    self, ArmDoubt, BoxState, CapturePurpose, CellFacts, CellSource, Jog, Model, Motion, Moves, PoseSequence,
-    StopOutcome, WorkBox,
+    self, ArmDoubt, BoxState, CapturePurpose, CellFacts, CellSource, Jog, LinkState, Model, Motion, Moves,
+    PoseSequence, StopOutcome, WorkBox,
 };
-use crate::text::Language;
+use crate::text::{Language, Text};
 
 const BUTTON: &str = "Calibrate for me";
 const FOREIGN: ArmDoubt = ArmDoubt::Foreign { distance_m: 0.074, angle_rad: 0.1 };
@@ -99,6 +99,10 @@ fn what_is_under_way_and_why_stands_in_the_pane() {
     assert!(pane.sees("Lowers the expected error from 0.800 to 0.500 mm, mostly in the rotation of the camera"));
     assert!(pane.sees("goal 0.300 mm"), "the goal that it began with");
     assert!(self::pane(under_way(Waits::Choice, None)).sees("Choosing pose 2"));
+    let mut refused = under_way(Waits::Choice, None);
+    let why = StopOutcome::Skipped(Text::verbatim("the pendant is in manual mode"));
+    refused.sequence.as_mut().expect("one").outcomes = vec![why];
+    assert!(self::pane(refused).sees("The pose before was left out: the pendant is in manual mode"));
     let checking = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
     assert!(self::pane(checking).sees("Check 1 of 3"));
 }
@@ -143,6 +147,13 @@ fn a_person_lets_the_arm_move_or_has_another_pose_chosen() {
     assert_eq!(waiting.click("Skip this pose"), [Command::SkipMove]);
     assert_eq!(waiting.click("Confirm each move"), [Command::SetConfirmMoves(false)], "on behind an address");
     assert!(waiting.nothing_is_cut_off());
+    let mut read_only = model.clone();
+    read_only.cell.iter_mut().for_each(|cell| cell.moves = Moves::OnceArmed { joints: true, tip: true });
+    read_only.robot.iter_mut().for_each(|robot| robot.is_armed = false);
+    assert!(!pane(read_only).is_enabled("Move there"), "not before somebody lets it");
+    let mut lost = model.clone();
+    lost.mover = LinkState::Failed { why: Text::verbatim("gone") };
+    assert!(!pane(lost).is_enabled("Move there"), "not without a connection");
     model.motion = Motion::Jogging(Jog::Joint { index: 0, forward: true });
     assert!(!pane(model).is_enabled("Move there"), "not while it moves");
     let running = pane(under_way(Waits::Nothing, None));

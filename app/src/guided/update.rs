@@ -54,6 +54,7 @@ impl App {
             return true;
         }
         guided.waits = Waits::Answer;
+        guided.refused_moves = 0;
         guided.ahead.clear();
         guided.since = (self.model.now_s, visited);
         sequence.names.truncate(visited);
@@ -73,12 +74,28 @@ impl App {
     /// All poses that were chosen have been visited; whether that is for the guide to go on with.
     pub(crate) fn guided_waits(&mut self) -> bool {
         let has_captures = !self.model.document().captures.is_empty();
+        let left_out = self.model.sequence.as_ref().and_then(|sequence| sequence.last_skipped().cloned());
         let Some(guided) = self.guided_mut() else { return false };
         guided.waits = Waits::Answer;
         if !has_captures {
-            self.guided_ends(Severity::Warning, Ending::NoStart.text());
+            self.guided_ends(Severity::Warning, left_out.unwrap_or_else(|| Ending::NoStart.text()));
         }
         true
+    }
+
+    /// The robot does not move to a pose of a guided sequence; whether it did not to the one before, either. A chosen pose is
+    /// within the limits of the joints and free to reach, so it is then not the pose that is in the way.
+    pub(crate) fn guided_was_refused(&mut self) -> bool {
+        let Some(guided) = self.guided_mut() else { return false };
+        guided.refused_moves += 1;
+        guided.refused_moves > 1
+    }
+
+    /// The arm is at a pose of a guided sequence.
+    pub(crate) fn guided_arrived(&mut self) {
+        if let Some(guided) = self.guided_mut() {
+            guided.refused_moves = 0;
+        }
     }
 
     /// A pose of a guided sequence is over.
@@ -118,7 +135,7 @@ impl App {
         let request = GuideRequest { guide: guided.guide.clone(), observations, solved, elapsed_s, speed, check };
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         if self.workers.guide(self.numbers.motion, request).is_err() {
-            self.break_off();
+            self.break_off(None);
         }
     }
 
@@ -130,7 +147,8 @@ impl App {
         }
         let Choice { guide, step, views_left, chosen_at } = match outcome {
             Ok(choice) => *choice,
-            Err(why) => return self.guided_ends(Severity::Warning, why),
+            // As where the connection broke: nothing says that there are no more poses.
+            Err(why) => return self.break_off(Some(why)),
         };
         let Some(guided) = self.guided_mut() else { return };
         guided.guide = guide;
@@ -297,6 +315,9 @@ impl App {
 
     fn guided_ends(&mut self, severity: Severity, why: Text) {
         self.keep_guided();
+        if let Some(guided) = self.guided_mut() {
+            guided.is_over = true;
+        }
         self.model.sequence_runs = false;
         match severity {
             Severity::Info => self.say(severity, why),

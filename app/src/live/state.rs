@@ -22,6 +22,10 @@ pub struct FrameInfo {
     pub sim_time_s: f64,
     /// How far they and pose and joints may be apart \[s\]: nothing where all is of one instant.
     pub image_age_s: f64,
+    /// How far the tip may have moved meanwhile \[m\], at its speed since the images before; a turn counts as at a metre from
+    /// the tip.
+    #[serde(default)]
+    pub image_off_m: f64,
     /// When they arrived.
     pub received_s: f64,
     /// Frames per second that arrive.
@@ -33,6 +37,9 @@ pub struct FrameInfo {
     /// The tip as the controller reported it at the instant of the images; not known where the states of a robot leave a
     /// gap, or nobody has typed it.
     pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// Why that is not known.
+    #[serde(default)]
+    pub no_pose: Option<Box<Text>>,
     /// The joints at the same instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it; only ever compared with.

@@ -152,6 +152,16 @@ pub enum MotionOutcome {
     Failed(Text),
 }
 
+impl MotionOutcome {
+    /// Why the arm is not at its goal, where there is a reason to say.
+    pub fn why(&self) -> Option<&Text> {
+        match self {
+            Self::Refused(why) | Self::Failed(why) => Some(why),
+            Self::Arrived | Self::Stopped => None,
+        }
+    }
+}
+
 /// What the arm does now, as far as this program moves it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub enum Motion {

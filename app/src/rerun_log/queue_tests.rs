@@ -23,6 +23,8 @@ fn image(number: u64) -> Entry {
         number,
         sim_time_s: 0.0,
         image_age_s: 0.0,
+        image_off_m: 0.0,
+        no_pose: None,
         received_s: 0.0,
         rate_hz: 0.0,
         depth_range_m: [0.0, 1.0],

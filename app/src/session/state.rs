@@ -96,6 +96,20 @@ impl PoseSequence {
         self.names.get(self.outcomes.len()).map(String::as_str)
     }
 
+    /// Why the pose before was left out, where it was.
+    pub fn last_skipped(&self) -> Option<&Text> {
+        match self.outcomes.last()? {
+            StopOutcome::Skipped(why) => Some(why),
+            StopOutcome::Done => None,
+        }
+    }
+
+    /// Whether there is something to go on with once it was broken off: poses that are left, or, where they are chosen on the
+    /// way, the choice of the next one or of one to check the answer at.
+    pub fn can_continue(&self) -> bool {
+        self.guided.as_deref().map_or(self.current().is_some(), |guided| !guided.is_over)
+    }
+
     /// Whether it leads to poses that were planned to verify at.
     pub fn is_planned(&self) -> bool {
         self.planned.is_some() && self.guided.is_none()

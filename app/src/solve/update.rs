@@ -104,6 +104,7 @@ impl App {
             observations,
             captures,
             verification,
+            recorded: self.model.session.folder.clone().map(|folder| (folder, Arc::new(document.clone()))),
             method: Method::by_name(&self.model.method).unwrap_or_default(),
             options: Options { keep_outliers: self.model.keep_outliers, ..Options::default() },
             goal_m: self.model.view.goal.0,

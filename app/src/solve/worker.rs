@@ -2,15 +2,17 @@
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::depth::DepthImage;
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::{Finding, FindingOptions};
 use handeye_core::estimate::handeye::HandEyeError;
 use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options};
 use handeye_core::progress::{CancelToken, Progress, Work};
 use handeye_core::project::result::{VerificationSummary, solve_options};
-use handeye_core::project::session::CaptureId;
+use handeye_core::project::session::{CaptureId, Document};
 use handeye_core::targets::observation::View;
 use handeye_core::verify::{self, CheckCapture, Predictor, Verification, VerifyError};
 
@@ -34,6 +36,8 @@ pub struct SolveJob {
     pub captures: Vec<CaptureId>,
     /// What was observed in captures that never enter the fit.
     pub verification: Vec<(CaptureId, View)>,
+    /// Where all of them are recorded, with the depths that were measured.
+    pub recorded: Option<(PathBuf, Arc<Document>)>,
     /// Which answer is asked for.
     pub method: Method,
     /// What is changed about it.
@@ -96,8 +100,14 @@ pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) ->
     result.findings = findings.iter().map(Finding::to_record).collect();
     let calibrated = Predictor::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
-        let captures: Vec<CheckCapture<'_>> =
-            job.verification.iter().map(|(_, view)| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
+        let depths: Vec<Option<DepthImage>> = job.verification.iter().map(|(id, _)| depth(job, *id)).collect();
+        let captures: Vec<CheckCapture<'_>> = job
+            .verification
+            .iter()
+            .zip(&depths)
+            // Where nothing reflects a sensor reports its far plane, which no corner of a board is at.
+            .map(|((_, view), depth)| CheckCapture { view, depth: depth.as_ref(), far_m: f32::INFINITY })
+            .collect();
         verify::verify(calibrated, &job.observations.target, &captures, work)
     });
     if let Some(Err(VerifyError::Cancelled)) = verification {
@@ -117,11 +127,73 @@ pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) ->
     })
 }
 
+/// The depth that was measured in a capture. One that cannot be read is as none: the answer does not depend on it.
+fn depth(job: &SolveJob, id: CaptureId) -> Option<DepthImage> {
+    let (folder, document) = job.recorded.as_ref()?;
+    let depth = document.capture(id)?.load_depth_m(folder);
+    depth.unwrap_or_else(|error| {
+        tracing::warn!(%error, "the depth of a capture for verification cannot be read");
+        None
+    })
+}
+
 fn summary(verification: &Verification) -> VerificationSummary {
     VerificationSummary {
         captures: verification.captures.len(),
         rms_px: verification.rms_px,
         centre_rms_mm: verification.centre_rms_m * 1e3,
         orientation_rms_deg: verification.orientation_rms_rad.to_degrees(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use handeye_core::image::RgbImage;
+    use handeye_core::project::session::{Capture, Role, Session, Store};
+
+    use super::*;
+    use crate::gui::testing::sample;
+    use crate::session::start;
+
+    /// A depth camera beside the lens: what it measured at the board stands beside what the calibration predicts.
+    #[test]
+    fn the_depth_of_a_capture_for_verification_is_compared_with_that_of_the_board() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut store =
+            Store::create(folder.path(), start::meta(None, "2026-05-02T10:11:12Z".to_owned())).expect("a session");
+        let image = RgbImage::new(640, 480);
+        let depth = DepthImage::new(640, 480, vec![0.4; 640 * 480]).expect("as many as pixels");
+        let model = sample::solved();
+        let solved = model.solve.solved.as_ref().expect("solved");
+        let verified = solved.verified_captures[0];
+        let record = model.document().capture(verified).expect("a capture");
+        let capture =
+            Capture { depth_m: Some(&depth), role: Role::Verification, ..Capture::new(&image, record.base_from_tip) };
+        let id = store.add_capture(&capture).expect("written");
+        drop(store);
+        let corners = model.observed(verified).and_then(|seen| seen.corners.clone()).expect("seen");
+        let document = Session::open(folder.path()).expect("a session").document;
+        let job = SolveJob {
+            id: JobId(1),
+            observations: sample::observations(),
+            captures: solved.captures.clone(),
+            verification: vec![(id, View::new(record.image.clone(), record.base_from_tip, corners))],
+            recorded: Some((folder.path().to_path_buf(), document)),
+            method: Method::Joint,
+            options: Options::default(),
+            goal_m: 5e-4,
+            truth: None,
+        };
+        let off_m = |job: &SolveJob| {
+            let solved = answer(job, (&CancelToken::default()).into()).expect("an answer");
+            solved.verification.expect("verified").expect("it is one").captures[0].depth_error_m
+        };
+        let seen_m = solved.verification.as_ref().and_then(|it| it.as_ref().ok()).expect("verified").captures[0]
+            .predicted_camera_from_target
+            .translation()
+            .z;
+        let measured = off_m(&job).expect("a depth camera is there");
+        assert!((measured - (0.4 - seen_m)).abs() < 0.1, "{measured} m, the board is at {seen_m} m");
+        assert_eq!(off_m(&SolveJob { recorded: None, ..job }), None);
     }
 }

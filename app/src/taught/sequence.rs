@@ -167,19 +167,21 @@ impl App {
         let Some(sequence) = &self.model.sequence else { return };
         if sequence.current().is_none() {
             // No pose is under way but the choice of one, and that ended without one.
-            return self.break_off();
+            return self.break_off(outcome.why().cloned());
         }
+        let (purpose, name) = (sequence.purpose, sequence.current().map(str::to_owned));
         match outcome {
-            MotionOutcome::Arrived => match sequence.purpose {
-                Some(purpose) => {
-                    let name = sequence.current().map(str::to_owned);
-                    self.capture(purpose, name);
+            MotionOutcome::Arrived => {
+                self.guided_arrived();
+                match purpose {
+                    Some(purpose) => self.capture(purpose, name),
+                    None => self.end_stop(StopOutcome::Done),
                 }
-                None => self.end_stop(StopOutcome::Done),
-            },
+            }
             // A pose that cannot be reached is left out; the others can still be visited.
+            MotionOutcome::Refused(why) if self.guided_was_refused() => self.break_off(Some(why.clone())),
             MotionOutcome::Refused(why) => self.end_stop(StopOutcome::Skipped(why.clone())),
-            MotionOutcome::Stopped | MotionOutcome::Failed(_) => self.break_off(),
+            MotionOutcome::Stopped | MotionOutcome::Failed(_) => self.break_off(outcome.why().cloned()),
         }
     }
 
@@ -200,14 +202,19 @@ impl App {
         if refused.kind.concerns_the_pose() {
             self.end_stop(StopOutcome::Skipped(refused.why.clone()));
         } else {
-            self.break_off();
+            self.break_off(Some(refused.why.clone()));
         }
     }
 
-    pub(crate) fn break_off(&mut self) {
+    /// Ends a sequence before its end, and says why where that is known.
+    pub(crate) fn break_off(&mut self, why: Option<Text>) {
         self.model.sequence_runs = false;
         let pane = self.model.sequence.as_ref().map_or(Pane::Taught, pane_of);
-        self.say_in(pane, Severity::Warning, text!("The sequence was broken off; what was captured is kept"));
+        let said = match why {
+            Some(why) => text!("The sequence was broken off, and what was captured is kept: {why}", why = why),
+            None => text!("The sequence was broken off; what was captured is kept"),
+        };
+        self.say_in(pane, Severity::Warning, said);
     }
 }
 

@@ -1,7 +1,7 @@
 //! What an error of the client means for a connection.
 
-use handeye_sim_link::client::LinkError;
 use handeye_sim_link::client::cell::Arm;
+use handeye_sim_link::client::{Connection, LinkError};
 
 use crate::text;
 use crate::text::Text;
@@ -9,7 +9,7 @@ use crate::worker::port::PortError;
 
 /// Whether the cell is there, as far as is known without asking.
 pub(crate) fn check_arm(arm: &mut Arm) -> Result<(), PortError> {
-    check(arm.sim().connection().is_connected())
+    check(arm.sim().connection())
 }
 
 pub(crate) fn port_error(error: LinkError) -> PortError {
@@ -32,6 +32,11 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
             there = there.join(", ")
         ),
         LinkError::Disconnected { .. } => closed(),
+        LinkError::OwnCellEnded { .. } => own_cell_ended(),
+        LinkError::OwnCellSilent { after, .. } => text!(
+            "The built-in cell has not answered for {seconds} s: this computer has too much to do",
+            seconds = after.as_secs()
+        ),
         other => Text::verbatim(other.to_string()),
     };
     match error {
@@ -42,10 +47,41 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
 }
 
 /// Why nothing answers now.
-pub(super) fn closed() -> Text {
+fn closed() -> Text {
     text!("The server closed the connection. Start it again if it has ended.")
 }
 
-pub(super) fn check(is_connected: bool) -> Result<(), PortError> {
-    if is_connected { Ok(()) } else { Err(PortError::Lost(closed())) }
+/// Nobody has to do anything: this program starts it.
+fn own_cell_ended() -> Text {
+    text!("The built-in cell has ended, and is started again")
+}
+
+pub(super) fn check(connection: &mut Connection) -> Result<(), PortError> {
+    if connection.is_connected() {
+        return Ok(());
+    }
+    Err(PortError::Lost(if connection.is_of_own_cell() { own_cell_ended() } else { closed() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::text::Language;
+
+    #[test]
+    fn the_built_in_cell_is_not_to_be_started_again_by_a_person() {
+        let call = || "sim.getObjectPose".to_owned();
+        let ended = LinkError::OwnCellEnded { call: call() };
+        let silent = LinkError::OwnCellSilent { call: call(), after: Duration::from_secs(30) };
+        for (error, says) in [(ended, "is started again"), (silent, "for 30 s: this computer has too much to do")] {
+            let PortError::Lost(why) = port_error(error) else { panic!("it is connected to again") };
+            let said = why.say(Language::English);
+            assert!(said.contains(says) && !said.contains("Start it"), "{said}");
+            assert_ne!(why.say(Language::Chinese), said);
+        }
+        let PortError::Lost(other) = port_error(LinkError::Disconnected { call: call() }) else { panic!("it is lost") };
+        assert!(other.say(Language::English).contains("Start it again if it has ended"));
+    }
 }

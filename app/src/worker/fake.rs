@@ -15,7 +15,8 @@ use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, F
 use nalgebra::Isometry3;
 
 use super::port::{
-    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
+    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room,
+    ViewsRequest,
 };
 use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Simulation};
 use crate::text;
@@ -309,11 +310,11 @@ impl MotionPort for FakeCell {
 }
 
 impl CameraPort for FakeCell {
-    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError> {
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError> {
         let mut script = self.answer()?;
         let next = script.frames + u64::from(script.frames_left > 0);
         if seen_s == Some(next as f64 * 0.05) {
-            return Ok(None);
+            return Ok(Newest::Same);
         }
         if script.frames_left > 0 {
             script.frames_left -= 1;
@@ -321,16 +322,17 @@ impl CameraPort for FakeCell {
         }
         let (width, height) = SIZE;
         let metres = (0..width * height).map(|i| 0.4 + 0.4 * (i % width) as f32 / width as f32).collect();
-        Ok(Some(RawFrame {
+        Ok(Newest::Frame(Box::new(RawFrame {
             rgb: Self::rgb(script.frames),
             depth: Some(DepthImage { width, height, metres }),
             sim_time_s: script.frames as f64 * 0.05,
             image_age_s: 0.0,
             base_from_tip: Some(Pose::from_translation_xyzw([0.11, -0.016, 0.847], [0.0, 0.0, 0.0, 1.0])),
+            no_pose: None,
             joints_rad: [0.0, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
             base_from_target_true: None,
             clocks: None,
-        }))
+        })))
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {

@@ -11,7 +11,7 @@ use handeye_sim_link::client::{
 };
 
 use super::cell_error::{check, check_arm, port_error};
-use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError, RawFrame};
+use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, Newest, PortError, RawFrame};
 use crate::model::{BoardMotion, CellFacts, RobotState, Simulation};
 use crate::motion::live::LiveMotion;
 use crate::text::Text;
@@ -65,9 +65,13 @@ impl LiveConnector {
         half: impl FnOnce(&Endpoint, &ConnectionOptions, &CellPaths) -> Result<Half, LinkError>,
     ) -> Result<Half, PortError> {
         let endpoint = self.endpoint()?;
-        let options = ConnectionOptions { shutdown: shutdown.clone(), ..ConnectionOptions::default() };
+        let usual = match &self.cell {
+            Cell::BuiltIn(_) => ConnectionOptions::own_cell(),
+            Cell::At(_) => ConnectionOptions::default(),
+        };
+        let options = ConnectionOptions { shutdown: shutdown.clone(), ..usual };
         let connected = half(&endpoint, &options, &self.paths);
-        if let Err(LinkError::Unreachable { .. }) = &connected {
+        if let Err(LinkError::OwnCellEnded { .. }) = &connected {
             self.give_up_server(&endpoint);
         }
         connected.map_err(port_error)
@@ -183,23 +187,32 @@ struct LiveCamera {
 }
 
 impl CameraPort for LiveCamera {
-    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError> {
-        check(self.feed.sim().connection().is_connected())?;
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError> {
+        check(self.feed.sim().connection())?;
         // Cheap to ask for, and images of a time that has been seen are not fetched again.
         if seen_s == Some(self.feed.sim().get_simulation_time().map_err(port_error)?) {
-            return Ok(None);
+            return Ok(Newest::Same);
         }
-        let frame = self.feed.grab().map_err(port_error)?;
-        Ok(Some(RawFrame {
+        let frame = match self.feed.grab() {
+            Ok(frame) => frame,
+            // A machine under load is late; the next frame may be whole, and whoever waits for one has a limit.
+            Err(error @ LinkError::MixedInstants { .. }) => {
+                tracing::debug!(%error, "an image is left out");
+                return Ok(Newest::Awaited);
+            }
+            Err(error) => return Err(port_error(error)),
+        };
+        Ok(Newest::Frame(Box::new(RawFrame {
             rgb: frame.rgb,
             depth: Some(frame.depth),
             sim_time_s: frame.sim_time_s,
             image_age_s: frame.image_age_s,
             base_from_tip: Some(frame.base_from_tip),
+            no_pose: None,
             joints_rad: frame.joints,
             base_from_target_true: frame.base_from_target_true,
             clocks: None,
-        }))
+        })))
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {

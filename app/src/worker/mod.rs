@@ -53,7 +53,8 @@ pub use files::{ExportJob, FileTask};
 pub use link::Request;
 pub use live::LiveConnector;
 pub use port::{
-    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
+    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room,
+    ViewsRequest,
 };
 pub use slot::LatestSlot;
 pub use started::Started;

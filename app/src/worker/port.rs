@@ -260,6 +260,8 @@ pub struct RawFrame {
     pub image_age_s: f64,
     /// The tip as the controller reports it at that instant, where that is known.
     pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// Why that is not known.
+    pub no_pose: Option<Text>,
     /// The joints at that instant \[rad\]; none where the robot does not report them.
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it.
@@ -268,14 +270,25 @@ pub struct RawFrame {
     pub clocks: Option<[f64; 2]>,
 }
 
+/// What a camera gives that is asked for its newest images.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Newest {
+    /// New ones.
+    Frame(Box<RawFrame>),
+    /// The camera answers that time stands still: it has none but those that were seen.
+    Same,
+    /// It has not answered yet.
+    Awaited,
+}
+
 /// The camera.
 pub trait CameraPort: Send {
-    /// The newest images; `None` while there are none of another instant than the last ones, whose time was `seen_s`. Waits
-    /// no longer than a tenth of a second for them.
+    /// The newest images of another instant than the last ones, whose time was `seen_s`. Waits no longer than a tenth of a
+    /// second for them.
     ///
     /// # Errors
     /// [`PortError`].
-    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError>;
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError>;
 
     /// Depths \[m\] that the sensor can measure; it reports the far one where nothing reflects.
     fn depth_limits_m(&self) -> [f32; 2];

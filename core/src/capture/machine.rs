@@ -9,8 +9,9 @@ use crate::depth::DepthImage;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::targets::observation::Corner;
 
-/// So long \[s\], on the clock of whoever asks, images may stay away and simulated time may stand still.
-pub const NO_IMAGES_S: f64 = 2.0;
+/// So long \[s\], on the clock of whoever asks, images may stay away and simulated time may stand still: a slow camera, or one
+/// late image of a computer under load, is waited for.
+pub const NO_IMAGES_S: f64 = 5.0;
 
 /// Images that must have come before robot or image are said not to come to rest: twice as many as show that they
 /// are. A simulation that runs as fast as it can may pass the limit of time between two.

@@ -63,6 +63,8 @@ pub(super) struct Filled {
     pub itself_m: f64,
     /// Tip and camera, in the base.
     pub watched: Vec<Point3<f64>>,
+    /// The links, in the base, but for the last one, which holds what is on the tip.
+    pub inner: Vec<Capsule>,
 }
 
 /// Capsules of the UR5 in the order from base to tool.
@@ -100,10 +102,10 @@ impl Arm {
     pub(super) fn filled(&self, joints: &[f64]) -> Option<Filled> {
         let frames = self.chain.frames(joints).ok()?;
         let arm_from_connection = frames.base_from_flange * self.chain.flange_from_tip;
-        let (moving, itself_m) = match &self.body {
+        let (moving, itself_m, inner) = match &self.body {
             ArmBody::Ur5 => {
                 let body = self.ur5(&frames, &arm_from_connection);
-                (body.moving(), body.distance_from_itself_m())
+                (body.moving(), body.distance_from_itself_m(), body.inner())
             }
             ArmBody::Links(capsules) => {
                 let arm_from_links: Vec<Isometry3<f64>> = links::arm_from_links(&frames).collect();
@@ -114,13 +116,15 @@ impl Arm {
                 });
                 let hand = self.hand(&arm_from_connection);
                 let body = LinksBody { links: links.collect::<Option<_>>()?, hand };
-                (body.moving(), body.distance_from_itself_m())
+                (body.moving(), body.distance_from_itself_m(), body.inner())
             }
         };
         let world_from_tip = self.world_from_arm * arm_from_connection * self.connection_from_tip;
         let cameras = self.carried.iter().filter_map(Carried::watched).map(|camera| world_from_tip * camera);
+        let in_base = |capsules: &[Capsule]| capsules.iter().map(|c| c.moved(&self.world_from_arm)).collect();
         Some(Filled {
-            moving: moving.iter().map(|capsule| capsule.moved(&self.world_from_arm)).collect(),
+            moving: in_base(&moving),
+            inner: in_base(&inner),
             itself_m,
             watched: std::iter::once(Point3::from(world_from_tip.translation.vector)).chain(cameras).collect(),
         })
@@ -199,6 +203,11 @@ impl LinksBody {
         self.links.iter().filter(|(link, _)| *link > 0).map(|(_, capsule)| *capsule).chain(self.hand.all()).collect()
     }
 
+    fn inner(&self) -> Vec<Capsule> {
+        let last = self.links.iter().map(|(link, _)| *link).max();
+        self.links.iter().filter(|(link, _)| Some(*link) != last).map(|(_, capsule)| *capsule).collect()
+    }
+
     /// Two that have no more between them than their own thickness touch by design, and so do those that share a joint, and
     /// what is on the last link does with that one: as far as it reaches back along it, it is on the one before too.
     fn distance_from_itself_m(&self) -> f64 {
@@ -233,6 +242,11 @@ impl LinksBody {
 }
 
 impl Ur5Body {
+    fn inner(&self) -> Vec<Capsule> {
+        let [wrist_1, wrist_2, _holds] = self.wrist;
+        vec![self.column, self.upper_arm, self.forearm, wrist_1, wrist_2]
+    }
+
     fn moving(&self) -> Vec<Capsule> {
         [self.upper_arm, self.forearm].into_iter().chain(self.wrist).chain(self.hand.all()).collect()
     }

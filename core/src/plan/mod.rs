@@ -8,6 +8,7 @@ mod contact;
 pub mod guided;
 pub mod links;
 mod pace;
+mod sight;
 mod spread;
 pub mod surroundings;
 
@@ -16,6 +17,7 @@ pub use carried::Carried;
 pub use clearance::{Arm, ArmBody, travel};
 pub use contact::{Contact, Guard};
 pub use pace::Pace;
+pub use sight::Sight;
 pub use spread::{
     PlanError, PlannedView, ViewOptions, ViewSetup, order_by_travel, poses_looking_at, poses_unlike,
     random_poses_looking_at, shows_within, views_of_board,

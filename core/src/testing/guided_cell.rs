@@ -225,7 +225,7 @@ impl GuidedCell {
             intrinsics,
             mount_from_camera,
             anchor_from_target,
-            robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, pace: PACE },
+            robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, pace: PACE, sight: None },
             observations: Observations {
                 mode: Some(setup.mode),
                 target: BOARD,

@@ -121,6 +121,21 @@ impl Connection {
         self.transport.connected()
     }
 
+    /// Whether the server is a cell in this process.
+    pub fn is_of_own_cell(&self) -> bool {
+        self.options.is_own_cell
+    }
+
+    /// What it means that the conversation broke off in a call.
+    pub(super) fn broken_off(&self, call: &str) -> LinkError {
+        let (call, after) = (call.to_owned(), self.options.reply_timeout);
+        if self.options.is_own_cell {
+            LinkError::OwnCellSilent { call, after }
+        } else {
+            LinkError::Disconnected { call }
+        }
+    }
+
     /// This client's id.
     pub fn uuid(&self) -> &str {
         &self.uuid
@@ -324,16 +339,18 @@ impl Connection {
 
     fn late(&mut self, exchange: &Exchange<'_>, after: Duration) -> LinkError {
         let call = exchange.func.to_owned();
-        if self.transport.connected() {
-            LinkError::Timeout { call, after }
-        } else {
-            LinkError::Unreachable { call, endpoint: self.endpoint.clone(), after }
+        match (self.transport.connected(), self.options.is_own_cell) {
+            (true, true) => LinkError::OwnCellSilent { call, after },
+            (false, true) => LinkError::OwnCellEnded { call },
+            (true, false) => LinkError::Timeout { call, after },
+            (false, false) => LinkError::Unreachable { call, endpoint: self.endpoint.clone(), after },
         }
     }
 
     fn fault(&mut self, exchange: &Exchange<'_>, fault: TransportFault) -> LinkError {
         let call = exchange.func.to_owned();
         let error = match fault {
+            TransportFault::Disconnected if self.options.is_own_cell => LinkError::OwnCellEnded { call },
             TransportFault::Disconnected => LinkError::Disconnected { call },
             TransportFault::TooLong => LinkError::ReplyTooLarge { call, bytes: None },
             TransportFault::ManyParts(parts) => LinkError::UnexpectedReply {
@@ -343,7 +360,7 @@ impl Connection {
             },
             TransportFault::Refused(reason) => LinkError::Socket { endpoint: self.endpoint.to_string(), reason },
         };
-        if matches!(error, LinkError::Disconnected { .. }) {
+        if matches!(error, LinkError::Disconnected { .. } | LinkError::OwnCellEnded { .. }) {
             // Whatever comes back on that address may be a new server, of another version.
             self.version = None;
             self.drop_exchange();

@@ -300,3 +300,24 @@ fn a_connection_can_move_to_another_thread() {
     std::thread::spawn(move || send.send(connection.call("sim.x", vec![])).expect("listening"));
     assert_eq!(receive.recv().expect("answered").expect("answered").integer(0), Ok(4));
 }
+
+/// Nobody can start it again, and no window of a simulator shows why it is late.
+#[test]
+fn a_cell_in_this_process_is_not_to_be_started_by_anybody() {
+    type Server = fn() -> Answer;
+    let servers: [(Server, &str); 2] = [
+        (|| Answer::Fault(TransportFault::Disconnected), "has ended by a defect of this program"),
+        (|| Answer::Silence, "this computer has too much to do"),
+    ];
+    for (server, says) in servers {
+        let (mut connection, _log) = connection(move |_| server());
+        connection.options.is_own_cell = true;
+        let error = connection.call("sim.a", vec![]).expect_err("no answer");
+        let said = error.to_string();
+        assert!(error.is_connection_loss() && said.contains(says), "{said}");
+        for word in ["start", "simulator", "CoppeliaSim", "server"] {
+            assert!(!said.contains(word), "{word}: {said}");
+        }
+    }
+    assert_eq!(ConnectionOptions::own_cell().heartbeat, None, "its silence does not mean that it has gone");
+}

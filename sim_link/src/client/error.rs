@@ -55,6 +55,22 @@ pub enum LinkError {
         /// Which call.
         call: String,
     },
+    /// The cell in this process did not answer in time.
+    #[error("{call}: the built-in cell has not answered for {after:.1?}: this computer has too much to do; try again")]
+    OwnCellSilent {
+        /// Which call.
+        call: String,
+        /// How long was waited.
+        after: Duration,
+    },
+    /// The cell in this process has ended before the program did.
+    #[error(
+        "{call}: the built-in cell has ended by a defect of this program: report it, with the lines above, and try again"
+    )]
+    OwnCellEnded {
+        /// Which call.
+        call: String,
+    },
     /// The caller cancelled.
     #[error("{call}: cancelled")]
     Cancelled {
@@ -317,6 +333,8 @@ impl LinkError {
             Self::Unreachable { .. }
                 | Self::Timeout { .. }
                 | Self::Disconnected { .. }
+                | Self::OwnCellSilent { .. }
+                | Self::OwnCellEnded { .. }
                 | Self::Cancelled { .. }
                 | Self::Malformed { .. }
                 | Self::Socket { .. }

@@ -22,6 +22,16 @@ pub struct ConnectionOptions {
     pub seed: Option<u64>,
     /// Ends every wait of this connection, for the end of the program.
     pub shutdown: CancelToken,
+    /// The server is a thread of this process: nobody can start it again, and it is late only where the computer is.
+    pub is_own_cell: bool,
+}
+
+impl ConnectionOptions {
+    /// For a cell in this process. Silence does not mean that it has gone: that is known at once, by the end of the
+    /// connection. So there are no heartbeats, and a computer under load has more time.
+    pub fn own_cell() -> Self {
+        Self { reply_timeout: Duration::from_secs(30), heartbeat: None, is_own_cell: true, ..Self::default() }
+    }
 }
 
 impl Default for ConnectionOptions {
@@ -33,6 +43,7 @@ impl Default for ConnectionOptions {
             idle_timeout_s: 8,
             seed: None,
             shutdown: CancelToken::default(),
+            is_own_cell: false,
         }
     }
 }

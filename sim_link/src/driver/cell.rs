@@ -10,13 +10,11 @@ use handeye_core::progress::CancelToken;
 use super::client::Driver;
 use super::clock::Timebase;
 use super::error::DriverError;
+use super::limits::STATE_AFTER_IMAGE;
 use super::message::Ability;
 use super::options::DriverOptions;
 use super::spec::DriverSpec;
 use super::states::{NoPose, RobotAt};
-
-/// How long an image waits for the state after it: three of the slowest driver.
-const STATE_PATIENCE: Duration = Duration::from_millis(300);
 
 /// Which drivers.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -152,13 +150,13 @@ impl DriverCell {
     /// The robot at a stamp of the camera, and how well that instant is known on the robot's clock.
     fn robot_with(&self, stamp_s: f64) -> Result<(Result<RobotAt, NoPose>, f64), DriverError> {
         if !self.is_two() {
-            return Ok((self.robot.robot_at(stamp_s, STATE_PATIENCE)?, 0.0));
+            return Ok((self.robot.robot_at(stamp_s, STATE_AFTER_IMAGE)?, 0.0));
         }
         if !self.robot.hello().can(Ability::State) {
             return Ok((Err(NoPose::NoRobot), 0.0));
         }
         let Some(clocks) = self.clock_difference() else { return Ok((Err(NoPose::NoClock), 0.0)) };
-        let robot = self.robot.robot_at(stamp_s + clocks.robot_from_camera_s, STATE_PATIENCE)?;
+        let robot = self.robot.robot_at(stamp_s + clocks.robot_from_camera_s, STATE_AFTER_IMAGE)?;
         Ok((robot, clocks.uncertainty_s))
     }
 }

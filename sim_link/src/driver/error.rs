@@ -55,10 +55,12 @@ pub enum DriverError {
         why: String,
     },
     /// Motion is not allowed.
-    #[error("the driver `{driver}` is read-only: allow it to move the arm first")]
+    #[error("the driver `{driver}` is read-only{}: allow it to move the arm first", since(why.as_ref()))]
     NotArmed {
         /// Its command or address.
         driver: String,
+        /// Why it is no longer armed, where it was and has said so.
+        why: Option<String>,
     },
     /// A motion is under way.
     #[error("the driver `{driver}` moves the arm already")]
@@ -86,6 +88,10 @@ pub enum DriverError {
         /// How long was waited.
         after: Duration,
     },
+}
+
+fn since(why: Option<&String>) -> String {
+    why.map(|why| format!(" ({why})")).unwrap_or_default()
 }
 
 impl DriverError {

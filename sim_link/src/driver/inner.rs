@@ -10,8 +10,8 @@ use super::clock::ClockOffset;
 use super::error::Ending;
 use super::log::LogLines;
 use super::message::{
-    Ability, AnswerMessage, DepthMessage, FromDriver, Hello, ImageMessage, LogLevel, LogMessage, PongMessage,
-    StateMessage,
+    Ability, AnswerMessage, DepthMessage, DisarmedMessage, FromDriver, Hello, ImageMessage, LogLevel, LogMessage,
+    PongMessage, StateMessage,
 };
 use super::placement::ChainWatch;
 use super::states::{Reading, States};
@@ -117,6 +117,10 @@ pub struct Inner {
     pub requests: BTreeMap<u64, Progress>,
     pub last_id: u64,
     pub is_armed: bool,
+    /// The request whose answer arms it: what is said after that answer may take it back at once.
+    pub arming: Option<u64>,
+    /// Why it is no longer, where the driver has said so.
+    pub disarmed: Option<String>,
     pub is_moving: bool,
     pub log: LogLines,
     pub trial: Trial,
@@ -155,12 +159,23 @@ impl Inner {
                 Ok(())
             }
             _ if is_early => Err(misplaced("only hello, log and error come before hello")),
+            FromDriver::Disarmed(DisarmedMessage { why }) => {
+                self.is_armed = false;
+                self.log.add(LogLevel::Warn, false, &format!("the arm may no longer be moved: {why}"));
+                self.disarmed = Some(why);
+                Ok(())
+            }
             FromDriver::Pong(pong) => self.take_pong(pong, arrived_s),
             FromDriver::State(state) => self.take_state(&state),
             FromDriver::Image(image) => self.take_image(image, bytes),
             FromDriver::Depth(depth) => self.take_depth(depth, bytes),
             FromDriver::Accepted(answer) => self.take_answer(answer, |_| Progress::Accepted),
-            FromDriver::Done(answer) => self.take_answer(answer, |_| Progress::Done),
+            FromDriver::Done(answer) => {
+                if self.arming == Some(answer.id) {
+                    (self.is_armed, self.disarmed, self.arming) = (true, None, None);
+                }
+                self.take_answer(answer, |_| Progress::Done)
+            }
             FromDriver::Stopped(answer) => self.take_answer(answer, Progress::Stopped),
             FromDriver::Refused(answer) => match &mut self.frame {
                 Some(frame) if frame.id == answer.id => {

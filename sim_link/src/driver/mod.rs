@@ -8,6 +8,7 @@
 //! | [`wire`] | lines and the bytes that follow them, with limits |
 //! | [`Driver`] | one program: state, images, motions, log, how it ended |
 //! | [`DriverHost`] | the same cell for several threads, started again when it is gone |
+//! | [`limits`] | what is asked of one in numbers |
 //! | [`conformance`] | whether a program keeps to the protocol |
 //! | [`fake`] | a driver with the built-in cell behind it |
 //! | [`DriverCell`] | a robot and a camera, in one program or two: images with the pose at their instant |
@@ -37,6 +38,7 @@ mod family;
 mod host;
 mod images;
 mod inner;
+pub mod limits;
 mod link;
 mod log;
 pub mod message;

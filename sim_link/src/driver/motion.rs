@@ -42,18 +42,21 @@ impl Driver {
         if !on {
             shared.lock().is_armed = false;
         }
-        let id = shared.request(|id| ToDriver::Arm { id, on })?;
+        let id = shared.request(|id| {
+            shared.lock().arming = on.then_some(id);
+            ToDriver::Arm { id, on }
+        })?;
         let what = if on { "`arm` with on" } else { "`arm` with off" };
         match shared.wait(shared.options.answer, None, |inner| inner.finished(id))? {
             Some(Progress::Refused(why)) => {
                 Err(DriverError::Refused { driver: self.name().to_owned(), what: "to be armed", why })
             }
-            Some(_) => {
-                shared.lock().is_armed = on;
-                Ok(())
-            }
+            Some(_) => Ok(()),
             None if on => {
-                shared.lock().abandon(id);
+                let mut inner = shared.lock();
+                inner.abandon(id);
+                inner.arming = None;
+                drop(inner);
                 Err(self.no_answer(what, shared.options.answer))
             }
             // A driver that may still move is none to stay connected with.
@@ -82,7 +85,8 @@ impl Driver {
         {
             let mut inner = shared.lock();
             if !inner.is_armed {
-                return Err(DriverError::NotArmed { driver: self.name().to_owned() });
+                let why = inner.disarmed.clone();
+                return Err(DriverError::NotArmed { driver: self.name().to_owned(), why });
             }
             if inner.is_moving {
                 return Err(DriverError::Busy { driver: self.name().to_owned() });

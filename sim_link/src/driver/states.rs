@@ -6,10 +6,9 @@ use handeye_core::geometry::arm::{Arm, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::geometry::se3;
 
+use super::limits::STATES_APART_S;
 use super::message::{BadMessage, PoseMessage, StateMessage};
 
-/// Two states farther apart than this \[s\] say too little of what was between them; the protocol asks for ten a second.
-const MOST_APART_S: f64 = 0.25;
 /// For how long states are kept \[s\]: longer than an image takes from its exposure to here.
 const MEMORY_S: f64 = 10.0;
 /// Most states that are kept: those of 8 s at the highest rate of the protocol.
@@ -69,7 +68,7 @@ pub enum NoPose {
         by_s: f64,
     },
     /// The states around it are too far apart.
-    #[error("the states before and after the image are {gap_s:.3} s apart, at most {MOST_APART_S} s")]
+    #[error("the states before and after the image are {gap_s:.3} s apart, at most {STATES_APART_S} s")]
     Gap {
         /// How far apart \[s\].
         gap_s: f64,
@@ -187,7 +186,7 @@ impl States {
             return Err(NoPose::TooOld { by_s: first.stamp_s - stamp_s });
         };
         let gap_s = after.stamp_s - before.stamp_s;
-        if gap_s > MOST_APART_S {
+        if gap_s > STATES_APART_S {
             return Err(NoPose::Gap { gap_s });
         }
         Ok(before.between(after, stamp_s))

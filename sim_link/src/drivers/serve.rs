@@ -4,7 +4,7 @@ use std::io::{BufRead as _, BufReader, Read, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 
@@ -14,6 +14,11 @@ use crate::driver::message::{AnswerMessage, LogLevel, LogMessage, PROTOCOL, Pong
 
 /// Longest line of the protocol, with its end.
 const MAX_LINE: u64 = 65_536;
+/// The workbench says `hello` at once. A driver that hears nothing for so long was started by a person.
+const LONELY: Duration = Duration::from_secs(1);
+/// What that person has to know.
+const WAITING: &str = "this program is a driver and waits for `hello` on its standard input, which the workbench sends that starts \
+                       it: name this command under Connect, Driver, or try it with `handeye driver test \"COMMAND\"`, in quotes";
 /// How often it is asked whether the workbench has gone without a word.
 const LOOK: Duration = Duration::from_millis(250);
 
@@ -40,6 +45,7 @@ pub fn serve(
     let lines = events.clone();
     spawn("driver-input", move || read_lines(input, &lines))?;
     let mut serving = Serving { outlet: outlet.clone(), device: Some(device), events };
+    let (began, mut is_said) = (Instant::now(), false);
     let result = loop {
         match received.recv_timeout(LOOK) {
             Ok(Event::Line(line)) => match serving.line(&line) {
@@ -50,6 +56,12 @@ pub fn serve(
             Ok(Event::Device(Err(fault))) => break Err(fault),
             Ok(Event::End | Event::Device(Ok(()))) | Err(mpsc::RecvTimeoutError::Disconnected) => break Ok(()),
             Err(mpsc::RecvTimeoutError::Timeout) if outlet.has_ended() => break Ok(()),
+            Err(mpsc::RecvTimeoutError::Timeout)
+                if !is_said && serving.device.is_some() && began.elapsed() > LONELY =>
+            {
+                outlet.log(LogLevel::Warn, WAITING);
+                is_said = true;
+            }
             Err(mpsc::RecvTimeoutError::Timeout) => {}
         }
     };

@@ -1,5 +1,5 @@
 """A driver with one thing wrong: `python broken.py FAULT [MARK]`. It moves by writing to the file MARK."""
-import json, os, struct, subprocess, sys, threading, time, zlib
+import json, os, random, struct, subprocess, sys, threading, time, zlib
 
 fault = sys.argv[1] if len(sys.argv) > 1 else "none"
 mark = sys.argv[2] if len(sys.argv) > 2 else None
@@ -31,6 +31,8 @@ def pose(z):
 
 def state():
     message = {"type": "state", "stamp": now(), "joints_rad": [joint], "base_from_tip": pose(joint), "moving": motion is not None}
+    if fault == "trembles":
+        message["joints_rad"] = [joint + random.choice([0.0, 0.001])]
     if fault == "nan":
         message["base_from_tip"]["translation_m"][0] = float("nan")
     elif fault == "no stamp":
@@ -81,6 +83,10 @@ def image(request):
         message["stamp"] = request["after"]
     elif fault == "image id":
         message["id"] += 7
+    elif fault == "image of three seconds ago":
+        message["stamp"] -= 3.0
+    elif fault == "camera blocks states":
+        time.sleep(0.4)
     message["bytes"] = len(data)
     if fault == "wrong length":
         message["bytes"] = len(data) * 3
@@ -122,7 +128,7 @@ def work():
                 joint += step
                 if mark and step:
                     open(mark, "a").write("moved\n")
-                if joint == goal:
+                if abs(goal - joint) <= (0.004 if fault == "stops short" else 0.0):
                     done, motion = motion["id"], None
             if fault != "no states":
                 send(state())
@@ -213,6 +219,9 @@ def hear(message):
         if not armed:
             halt()
         send({"type": "done", "id": number})
+        if armed and fault == "disarms":
+            armed = False
+            send({"type": "disarmed", "why": "the pendant is in manual mode"})
     elif kind == "move":
         if not armed and fault != "moves unarmed":
             send({"type": "refused", "id": number, "why": "read-only"})

@@ -203,6 +203,25 @@ fn what_a_driver_has_started_ends_with_it_also_when_it_has_left_the_group() {
 }
 
 #[test]
+fn a_driver_that_no_longer_moves_the_arm_says_why_and_is_asked_for_no_motion() {
+    let Some(python) = python() else { return };
+    let driver = start(&broken(&python, "disarms")).unwrap();
+    driver.first_state(PATIENCE, &CancelToken::default()).unwrap();
+    driver.arm(true).unwrap();
+    let until = Instant::now() + PATIENCE;
+    while driver.is_armed() {
+        assert!(Instant::now() < until, "it has said that it is not armed");
+        std::thread::yield_now();
+    }
+    let goal = Goal::Joints(JointValues::from([0.2]));
+    let refused = driver.move_to(&goal, 0.5, &CancelToken::default()).unwrap_err();
+    let manual = "the pendant is in manual mode";
+    assert!(matches!(&refused, DriverError::NotArmed { why: Some(why), .. } if why == manual), "{refused:?}");
+    assert!(refused.to_string().contains(manual));
+    assert!(driver.take_log().iter().any(|line| line.text.contains(manual)));
+}
+
+#[test]
 fn a_driver_that_does_not_stop_the_arm_loses_its_connection() {
     let Some(python) = python() else { return };
     let driver = start(&broken(&python, "ignores stop")).unwrap();
@@ -382,6 +401,9 @@ const FAULTS: &[(&str, &str)] = &[
     ("image of another size", "it is 128×48 and the camera of hello 64×48"),
     ("encoding", "unknown variant `yuv422`"),
     ("old image", "is not after"),
+    ("image of three seconds ago", "s before the present by the stamps of `pong`"),
+    ("camera blocks states", "an image has no pose of the robot"),
+    ("trembles", "its states have too much noise"),
     ("image id", "asks for no image"),
     ("two images", "asks for no image"),
     ("wrong length", "bytes: 9216, where width, height and encoding make 3072"),
@@ -393,13 +415,14 @@ const FAULTS: &[(&str, &str)] = &[
     ("moves unarmed", "`move` was accepted before `arm`"),
     ("does not arm", "it refuses to be armed: the key is in local mode"),
     ("does not answer move", "has not answered `move` with accepted or refused"),
+    ("stops short", "mm from the goal: 2 mrad and 2 mm at the most"),
     ("ignores stop", "did not come to rest after `stop`"),
     ("ignores silence", "a second of silence does not end a motion"),
     ("ignores the end", "does not end within 1 s after its standard input is closed"),
 ];
 
 /// Faults that a run without `--allow-motion` does not meet.
-const IN_MOTION: &[&str] = &["does not arm", "does not answer move", "ignores stop", "ignores silence"];
+const IN_MOTION: &[&str] = &["does not arm", "does not answer move", "stops short", "ignores stop", "ignores silence"];
 
 fn report(spec: &DriverSpec, allow_motion: bool) -> Report {
     let options = ConformanceOptions { allow_motion, driver: options() };

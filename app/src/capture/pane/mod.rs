@@ -120,12 +120,13 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     if model.by_hand.is_some() {
         return;
     }
-    let calibrates = |sequence: &&PoseSequence| sequence.purpose == Some(CapturePurpose::Calibrate);
+    // A guided one ends with checks, which are captures for verification.
+    let is_ours = |it: &&PoseSequence| it.guided.is_some() || it.purpose == Some(CapturePurpose::Calibrate);
     if is_wanted(model) {
         begin_ui(ui, model, hindrance, height, outbox);
         by_hand::pane::begin_ui(ui, model, hindrance, height, outbox);
     }
-    if let Some(sequence) = model.sequence.as_ref().filter(calibrates) {
+    if let Some(sequence) = model.sequence.as_ref().filter(is_ours) {
         sequence::continue_ui(ui, model, sequence, outbox);
     }
     let count = model.document().taught.len();

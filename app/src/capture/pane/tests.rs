@@ -2,13 +2,15 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use handeye_core::plan::guided::{Ending, GuidedOptions};
 use handeye_core::project::session::{CaptureId, CaptureRecord};
 
 use super::columns::{Column, Sort, sorted};
 use super::*;
 use crate::gui::testing::pane_harness::{PaneHarness, PaneState};
 use crate::gui::testing::sample;
-use crate::model::{CaptureRefused, RefusalKind};
+use crate::guided::state::{GuidedProgress, Waits};
+use crate::model::{CaptureRefused, RefusalKind, StopOutcome};
 use crate::text::{Language, Text};
 
 fn pane(model: Model) -> PaneHarness {
@@ -225,4 +227,33 @@ fn a_thousand_captures_cost_what_can_be_seen_of_them() {
     assert_eq!(pane.harness.state().textures.thumbnails.uploads(), uploads, "each once");
     let drawn = pane.harness.query_all_by_label_contains("Use capture").count();
     assert!((5..20).contains(&drawn), "{drawn} rows");
+}
+
+#[test]
+fn guided_capture_that_was_broken_off_between_two_poses_or_at_a_check_is_continued() {
+    let guided = |ending| {
+        let mut model = sample::solved();
+        let guided = GuidedProgress {
+            ending,
+            waits: Waits::Confirmation,
+            ..GuidedProgress::new(GuidedOptions::default(), 90.0)
+        };
+        let purpose = if guided.ending.is_some() { CapturePurpose::Verify } else { CapturePurpose::Calibrate };
+        model.sequence = Some(PoseSequence {
+            names: vec!["G1".to_owned()],
+            planned: Some(vec![[0.0; 6].into()]),
+            purpose: Some(purpose),
+            outcomes: vec![StopOutcome::Done],
+            began_s: 90.0,
+            guided: Some(Box::new(guided)),
+        });
+        model
+    };
+    for ending in [None, Some(Ending::GoalReached { error_m: 3e-4 })] {
+        let mut pane = pane(guided(ending));
+        assert_eq!(pane.click("Continue the sequence"), [Command::ContinueSequence]);
+    }
+    let mut over = guided(Some(Ending::GoalReached { error_m: 3e-4 }));
+    over.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("guided").is_over = true;
+    assert!(!pane(over).sees("Continue the sequence"), "there is nothing to go on with");
 }

@@ -172,7 +172,8 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
     let paths = args.objects.paths(paths);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sessions").join(timestamp()));
-    let mut cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &paths).map_err(Failure::failed)?;
+    let options = if server.is_some() { ConnectionOptions::own_cell() } else { ConnectionOptions::default() };
+    let mut cell = CellClient::connect(&endpoint, &options, &paths).map_err(Failure::failed)?;
     plan.check_joints(cell.info().joints.len())?;
     let truth = cell.camera().ground_truth().map_err(Failure::failed)?;
     let ran_before = cell.arm().sim().get_simulation_state().map_err(Failure::failed)? != SimulationState::Stopped;

@@ -9,6 +9,7 @@ use handeye_core::project::taught_poses::Goal;
 use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 
+use super::super::late::Late;
 use super::super::{Failure, record};
 use super::poses::Plan;
 use crate::capture::{self, CaptureEnd, CaptureRequest, Images, Measured};
@@ -213,6 +214,7 @@ fn is_forgotten(error: &LinkError) -> bool {
             | LinkError::Disconnected { .. }
             | LinkError::Timeout { .. }
             | LinkError::Unreachable { .. }
+            | LinkError::OwnCellSilent { .. }
     )
 }
 
@@ -235,10 +237,15 @@ impl Images for Passes<'_> {
     }
 
     fn next(&mut self) -> Result<LiveFrame, LinkError> {
-        if !std::mem::take(&mut self.first) {
-            self.cell.arm().sim().step(&CallOptions::cancelled_by(self.cancel))?;
-        }
-        let frame = self.cell.camera().grab()?;
+        let mut late = Late::default();
+        let frame = loop {
+            if !std::mem::take(&mut self.first) {
+                self.cell.arm().sim().step(&CallOptions::cancelled_by(self.cancel))?;
+            }
+            if let Some(frame) = late.grabbed(self.cell.camera().grab(), Instant::now())? {
+                break frame;
+            }
+        };
         *self.images += 1;
         Ok(record::live_frame(&self.info, *self.images, self.now_s(), frame))
     }

@@ -19,9 +19,9 @@ pub const EXAMPLES: &str = "Example:
   handeye driver fake --listen 127.0.0.1:7000";
 
 const ROSBRIDGE_EXAMPLES: &str = "Examples:
-  handeye driver rosbridge --url ws://192.168.0.7:9090         # lists the frames of tf and ends
-  handeye driver rosbridge --url ws://192.168.0.7:9090 --base-frame base_link --tip-frame tool0 \\
-      --image /camera/image_raw --camera-info /camera/camera_info";
+  handeye driver test \"handeye driver rosbridge --url ws://192.168.0.7:9090\"         # lists the frames of tf
+  handeye driver test \"handeye driver rosbridge --url ws://192.168.0.7:9090 --base-frame base_link --tip-frame tool0 \\
+      --image /camera/image_raw --camera-info /camera/camera_info\"";
 
 /// Options of `handeye driver`.
 #[derive(Debug, Args)]

@@ -18,6 +18,7 @@ use handeye_sim_link::client::cell::{
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use serde_json::{Value, json};
 
+use crate::cli::late::Late;
 use crate::cli::{Failure, record};
 use crate::limits;
 use crate::model::{FollowStatus, FollowWish, Step, Tracked};
@@ -118,9 +119,10 @@ impl Squares {
 }
 
 impl Live {
-    /// Connects to arm and camera.
-    pub fn connect(endpoint: &Endpoint, paths: &CellPaths) -> Result<Self, Failure> {
-        let cell = CellClient::connect(endpoint, &ConnectionOptions::default(), paths).map_err(Failure::failed)?;
+    /// Connects to arm and camera, of a cell in this program or elsewhere.
+    pub fn connect(endpoint: &Endpoint, paths: &CellPaths, is_own: bool) -> Result<Self, Failure> {
+        let options = if is_own { ConnectionOptions::own_cell() } else { ConnectionOptions::default() };
+        let cell = CellClient::connect(endpoint, &options, paths).map_err(Failure::failed)?;
         if let Some(shortfall) = shortfall::of(cell.info().support(), true) {
             tracing::warn!("{}", shortfall.say(Language::English));
         }
@@ -226,7 +228,7 @@ impl Live {
         let mut newest = None;
         let far_plane_m = feed.info().depth_optics.far_m as f32;
         let began = Instant::now();
-        let mut pause = Pause::default();
+        let (mut pause, mut late) = (Pause::default(), Late::default());
         let mut seen_s = f64::NEG_INFINITY;
         let mut next_line_s = PROGRESS_S;
         while !cancel.is_cancelled() && !arm_stands() && frames.is_none_or(|frames| summary.frames < frames) {
@@ -237,7 +239,7 @@ impl Live {
                 continue;
             }
             pause.is_over();
-            let frame = feed.grab().map_err(Failure::failed)?;
+            let Some(frame) = late.grabbed(feed.grab(), Instant::now()).map_err(Failure::failed)? else { continue };
             let received_s = began.elapsed().as_secs_f64();
             seen_s = frame.sim_time_s;
             let sight = TrackedImage {

@@ -143,7 +143,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         Ok(())
     };
     let mut summary = Summary::default();
-    let tracked = Live::connect(&endpoint, &paths)
+    let tracked = Live::connect(&endpoint, &paths, server.is_some())
         .and_then(|live| live.run(&job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary }));
     // What was tracked before an error is as good as the rest.
     document.finish(&summary, tracked.as_ref().err())?;

@@ -5,10 +5,12 @@ use std::time::Duration;
 use handeye_core::geometry::arm::JointValues;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::driver::message::Ability;
-use handeye_sim_link::driver::{DriverCell, NoPose};
+use handeye_sim_link::driver::{DriverCell, NoPose, limits};
 
 use super::{TypedPose, port_error};
-use crate::worker::{CameraPort, PortError, RawFrame};
+use crate::text;
+use crate::text::Text;
+use crate::worker::{CameraPort, Newest, PortError, RawFrame};
 
 /// Longest wait for an image in one call: the camera worker has other tasks, too.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -31,28 +33,33 @@ impl DriverCamera {
 }
 
 impl CameraPort for DriverCamera {
-    fn newest(&mut self, seen_s: Option<f64>) -> Result<Option<RawFrame>, PortError> {
+    fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError> {
         self.cell.check().map_err(port_error)?;
         let after = seen_s.and(self.seen_stamp_s);
         let Some(frame) = self.cell.frame(after, PATIENCE, &self.shutdown).map_err(port_error)? else {
-            return Ok(None);
+            return Ok(Newest::Awaited);
         };
         self.seen_stamp_s = Some(frame.stamp_s);
         let robot = match &self.typed {
-            Some(typed) => typed.get().map(|pose| (pose, None)),
-            None => frame.robot.inspect_err(complain).ok().map(|robot| (robot.base_from_tip, robot.joints)),
+            Some(typed) => typed.get().map(|pose| (pose, None)).ok_or_else(nothing_typed),
+            None => frame.robot.map(|robot| (robot.base_from_tip, robot.joints)).map_err(|why| no_pose(&why)),
+        };
+        let (robot, no_pose) = match robot {
+            Ok(robot) => (Some(robot), None),
+            Err(why) => (None, Some(why)),
         };
         let clocks = self.cell.clock_difference();
-        Ok(Some(RawFrame {
+        Ok(Newest::Frame(Box::new(RawFrame {
             rgb: frame.rgb,
             depth: frame.depth,
             sim_time_s: frame.time_s.unwrap_or(frame.stamp_s),
             image_age_s: frame.time_uncertainty_s,
             base_from_tip: robot.map(|(pose, _)| pose),
+            no_pose,
             joints_rad: robot.and_then(|(_, joints)| joints).unwrap_or_else(|| JointValues::zeros(0)),
             base_from_target_true: None,
             clocks: clocks.map(|clocks| [clocks.robot_from_camera_s, clocks.uncertainty_s]),
-        }))
+        })))
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {
@@ -62,6 +69,36 @@ impl CameraPort for DriverCamera {
     }
 }
 
-fn complain(why: &NoPose) {
-    tracing::debug!(%why, "an image has no pose");
+/// Freehand, and nobody has said where the robot is.
+fn nothing_typed() -> Text {
+    text!("type the pose that its pendant shows, and capture again")
+}
+
+/// Why the states of a driver do not say where the robot was in an image.
+fn no_pose(why: &NoPose) -> Text {
+    let seconds = |s: f64| format!("{s:.3}");
+    match *why {
+        NoPose::NoRobot => text!("its driver sends no states: connect a driver of the robot, or choose Freehand"),
+        NoPose::NoState => text!("its driver has not sent a state yet"),
+        NoPose::NoClock => {
+            text!("its clock and that of the camera are not related yet: a driver has not answered a ping")
+        }
+        NoPose::TooOld { by_s } => text!(
+            "the image is {by} s older than the oldest state that is kept: the camera's driver is late, or the time stamps of \
+             robot and camera are not of one clock",
+            by = seconds(by_s)
+        ),
+        NoPose::TooNew { by_s } => text!(
+            "its driver has sent no state after the image, the newest is {by} s older: states have to go on while the camera \
+             works",
+            by = seconds(by_s)
+        ),
+        NoPose::Gap { gap_s } => text!(
+            "its states before and after the image are {gap} s apart, more than {most} s: states have to go on while the camera \
+             works",
+            gap = seconds(gap_s),
+            most = limits::STATES_APART_S
+        ),
+        _ => Text::verbatim(why.to_string()),
+    }
 }

@@ -21,6 +21,12 @@ use crate::text;
 use crate::text::Text;
 use crate::worker::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 
+/// Beyond its own length a step of the tip may be so far \[m\] from the straight way: the wrist turns about other axes than the
+/// tip, and a change of configuration swings the arm by more.
+const STRAY_M: f64 = 0.02;
+/// Parts of the way at which that is looked at.
+const STRAY_SAMPLES: usize = 8;
+
 pub(super) struct DriverMotion {
     cell: DriverCell,
     /// What a person keeps the arm out of.
@@ -96,6 +102,42 @@ impl DriverMotion {
         Ok(contact.as_ref().map(contact_text))
     }
 
+    /// A goal in the terms in which the robot is moved: one that moves to joint values alone is sent to those that put its tip
+    /// there, by the chain of its joints.
+    fn in_its_terms(&self, goal: Goal) -> Result<Result<Goal, Text>, PortError> {
+        let Goal::Tip(pose) = goal else { return Ok(Ok(goal)) };
+        if self.robot().hello().can(Ability::MoveTip) {
+            return Ok(Ok(goal));
+        }
+        if matches!(self.robot().chain_placement(), ChainPlacement::Unnamed) {
+            return Ok(Err(text!(
+                "The robot's driver moves to joint values alone and names no chain of joints: move single joints, or have it name \
+                 its arm"
+            )));
+        }
+        Ok(self.placed()?.and_then(|Placed { kinematics, joints, .. }| {
+            let found = kinematics.reach(&pose, &joints);
+            found.map(Goal::Joints).map_err(|why| Text::verbatim(why.to_string()))
+        }))
+    }
+
+    /// Whether the tip stays near its straight way from here on a way that is straight in joint space: a small step is no swing of
+    /// the arm into another configuration.
+    fn strays(&self, from: &Reading, goal: &Goal, along_m: f64) -> bool {
+        let (Goal::Joints(to), Some(joints), Ok(kinematics)) = (goal, &from.joints, self.kinematics()) else {
+            return false;
+        };
+        let at = |part: f64| {
+            let joints = JointValues::from_fn(joints.len(), |i| joints[i] + part * (to[i] - joints[i]));
+            kinematics.tip(&joints).translation()
+        };
+        let (begin, end) = (at(0.0), at(1.0));
+        let off = |part: f64| (at(part) - (begin + (end - begin) * part)).norm();
+        (1..STRAY_SAMPLES)
+            .map(|k| off(k as f64 / STRAY_SAMPLES as f64))
+            .any(|off_m| off_m.is_nan() || off_m > STRAY_M + along_m)
+    }
+
     fn robot(&self) -> &Driver {
         self.cell.robot()
     }
@@ -119,7 +161,7 @@ impl DriverMotion {
             Ok(MoveEnd::Stopped(why)) if why.is_empty() => Ok(MotionOutcome::Stopped),
             Ok(MoveEnd::Stopped(why)) => Ok(MotionOutcome::Failed(text!("The robot stopped: {why}", why = why))),
             Ok(MoveEnd::Refused(why)) => Ok(MotionOutcome::Refused(text!("The robot refuses: {why}", why = why))),
-            Err(DriverError::NotArmed { .. }) => Ok(MotionOutcome::Refused(read_only())),
+            Err(DriverError::NotArmed { why, .. }) => Ok(MotionOutcome::Refused(read_only(why))),
             Err(error @ (DriverError::Cannot { .. } | DriverError::Busy { .. } | DriverError::Refused { .. })) => {
                 Ok(MotionOutcome::Refused(Text::verbatim(error.to_string())))
             }
@@ -138,7 +180,10 @@ impl MotionPort for DriverMotion {
             MotionGoal::Joints(joints) => Goal::Joints(joints),
             MotionGoal::Tip(pose) => Goal::Tip(pose),
         };
-        self.drive(&goal, speed, cancel)
+        match self.in_its_terms(goal)? {
+            Ok(goal) => self.drive(&goal, speed, cancel),
+            Err(why) => Ok(MotionOutcome::Refused(why)),
+        }
     }
 
     fn jog_step(
@@ -151,7 +196,17 @@ impl MotionPort for DriverMotion {
             Ok(reading) => reading,
             Err(why) => return Ok(MotionOutcome::Refused(why)),
         };
-        match step(request, length, &reading) {
+        let (wanted, goal) = match step(request, length, &reading) {
+            Ok(wanted) => (wanted, self.in_its_terms(wanted)?),
+            Err(why) => return Ok(MotionOutcome::Refused(why)),
+        };
+        let along_m = if matches!(request.jog, Jog::Translate { .. }) { length } else { 0.0 };
+        match goal {
+            Ok(goal) if matches!(wanted, Goal::Tip(_)) && self.strays(&reading, &goal, along_m) => {
+                Ok(MotionOutcome::Refused(text!(
+                    "From here the arm would have to change its configuration for this step: move single joints, or choose a smaller step"
+                )))
+            }
             Ok(goal) => self.drive(&goal, request.speed, cancel),
             Err(why) => Ok(MotionOutcome::Refused(why)),
         }
@@ -238,8 +293,14 @@ fn step(request: &JogRequest, length: f64, reading: &Reading) -> Result<Goal, Te
     Ok(Goal::Tip(Pose::<Base, Tip>::from_isometry(goal)))
 }
 
-fn read_only() -> Text {
-    text!("The robot is only read: press “Let the workbench move it” in Jog first")
+fn read_only(why: Option<String>) -> Text {
+    match why {
+        Some(why) => text!(
+            "The robot's driver no longer moves it ({why}): press “Let the workbench move it” in Jog once that is put right",
+            why = why
+        ),
+        None => text!("The robot is only read: press “Let the workbench move it” in Jog first"),
+    }
 }
 
 fn cannot_follow() -> Text {

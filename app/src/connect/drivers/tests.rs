@@ -1,5 +1,6 @@
 //! The workers over a driver that serves the built-in cell on a socket.
 
+use std::io::{BufRead as _, Write as _};
 use std::net::TcpListener;
 use std::sync::Arc;
 use std::thread;
@@ -10,18 +11,24 @@ use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::ArmKinematics;
 use handeye_sim_link::driver::fake::{Fake, FakeOptions, FakePart};
+use handeye_sim_link::driver::message::Ability;
 
 use super::*;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome, Moves, RobotState};
 use crate::text::Language;
-use crate::worker::{JogRequest, RawFrame};
+use crate::worker::{JogRequest, Newest, RawFrame};
 
 /// Serves one part of a cell to everybody who connects; the address.
 fn served(part: FakePart) -> String {
+    served_without(part, Vec::new())
+}
+
+/// The same of a driver that says that it cannot do some of it.
+fn served_without(part: FakePart, cannot: Vec<Ability>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = format!("tcp://{}", listener.local_addr().expect("bound"));
     let scene = Scene::reference().expect("the reference scene");
-    let fake = Arc::new(Fake::start(FakeOptions { part, ..FakeOptions::new(scene) }).expect("a cell"));
+    let fake = Arc::new(Fake::start(FakeOptions { part, cannot, ..FakeOptions::new(scene) }).expect("a cell"));
     thread::spawn(move || {
         for stream in listener.incoming().map_while(Result::ok) {
             let fake = Arc::clone(&fake);
@@ -49,8 +56,8 @@ fn first_state(control: &mut dyn ControlPort) -> RobotState {
 
 fn image(camera: &mut dyn CameraPort, seen_s: Option<f64>) -> RawFrame {
     loop {
-        if let Some(frame) = camera.newest(seen_s).expect("connected") {
-            return frame;
+        if let Newest::Frame(frame) = camera.newest(seen_s).expect("connected") {
+            return *frame;
         }
     }
 }
@@ -132,6 +139,86 @@ fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_o
     assert_eq!(motion.move_to(&goal, 0.5, &shutdown), Ok(MotionOutcome::Arrived));
 }
 
+/// As most makers' libraries have it.
+#[test]
+fn an_arm_that_takes_joint_values_alone_is_jogged_along_axes_and_goes_to_poses_by_its_chain() {
+    let connector = connector(Some(served_without(FakePart::Robot, vec![Ability::MoveTip])), None);
+    let shutdown = CancelToken::default();
+    let mut control = connector.connect_control(&shutdown).expect("connected").port;
+    let mut motion = connector.connect_motion(&shutdown).expect("connected").port;
+    assert_eq!(control.facts().expect("connected").moves, Moves::OnceArmed { joints: true, tip: false });
+    known_arm(control.as_mut());
+    let before = first_state(control.as_mut()).base_from_tip;
+    control.arm(true).expect("allowed");
+    for (axis, along) in [(Axis::Z, [0.0, 0.0, 0.02]), (Axis::X, [0.02, 0.0, 0.0])] {
+        let here = first_state(control.as_mut()).base_from_tip;
+        let jog = Jog::Translate { frame: JogFrame::Base, axis, forward: true };
+        let request = JogRequest { jog, tip_from_camera: None, speed: 0.5 };
+        assert_eq!(motion.jog_step(&request, 0.02, &shutdown), Ok(MotionOutcome::Arrived));
+        let there = first_state(control.as_mut()).base_from_tip;
+        let off_mm = (there.translation() - here.translation() - nalgebra::Vector3::from(along)) * 1e3;
+        assert!(off_mm.norm() < 0.2 && there.rotation().angle_to(&here.rotation()) < 1e-3, "off by {off_mm} mm");
+    }
+    assert_eq!(motion.move_to(&MotionGoal::Tip(before), 0.5, &shutdown), Ok(MotionOutcome::Arrived));
+    let (off_m, off_rad) = first_state(control.as_mut()).base_from_tip.distance_to(&before);
+    assert!(off_m < 2e-4 && off_rad < 1e-3, "{off_m} m, {off_rad} rad");
+    let far = Pose::from_translation_xyzw([9.0, 0.0, 0.3], [0.0, 1.0, 0.0, 0.0]);
+    let refused = motion.move_to(&MotionGoal::Tip(far), 0.5, &shutdown).expect("connected");
+    assert!(
+        matches!(&refused, MotionOutcome::Refused(why) if why.say(Language::English).contains("reach")),
+        "{refused:?}"
+    );
+}
+
+/// A driver in a few lines: it greets, answers pings, and sends images where it has some, and no states.
+fn scripted(has_images: bool) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = format!("tcp://{}", listener.local_addr().expect("bound"));
+    thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("the workbench");
+        let began = std::time::Instant::now();
+        let lines = std::io::BufReader::new(stream.try_clone().expect("a socket")).lines();
+        for line in lines.map_while(Result::ok) {
+            let asked: serde_json::Value = serde_json::from_str(&line).expect("a message");
+            let (id, stamp) = (&asked["id"], began.elapsed().as_secs_f64());
+            let answer = match asked["type"].as_str() {
+                Some("hello") => serde_json::json!({ "type": "hello", "protocol": 1, "name": "slow",
+                    "can": ["state", "image"], "camera": { "width": 4, "height": 2 } }),
+                Some("ping") => serde_json::json!({ "type": "pong", "id": id, "stamp": stamp }),
+                Some("next_image") if has_images => serde_json::json!({ "type": "image", "id": id, "stamp": stamp,
+                    "width": 4, "height": 2, "encoding": "mono8", "bytes": 8 }),
+                _ => continue,
+            };
+            let bytes: &[u8] = if answer["type"] == "image" { &[9; 8] } else { &[] };
+            let sent = stream.write_all(format!("{answer}\n").as_bytes()).and_then(|()| stream.write_all(bytes));
+            if sent.is_err() {
+                break;
+            }
+        }
+    });
+    address
+}
+
+/// Not the camera of a simulation that is paused, which answers that it has no other image.
+#[test]
+fn a_slow_camera_has_not_answered_yet() {
+    let shutdown = CancelToken::default();
+    let connector = connector(Some(scripted(false)), None);
+    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    assert_eq!(camera.newest(None), Ok(Newest::Awaited));
+}
+
+#[test]
+fn an_image_without_a_state_around_it_says_what_its_driver_owes_and_not_what_a_pendant_shows() {
+    let shutdown = CancelToken::default();
+    let connector = connector(Some(scripted(true)), None);
+    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    let frame = image(camera.as_mut(), None);
+    assert_eq!(frame.base_from_tip, None);
+    let why = frame.no_pose.expect("a reason").say(Language::English);
+    assert!(why.contains("has not sent a state") && !why.contains("pendant"), "{why}");
+}
+
 #[test]
 fn freehand_a_person_types_where_the_robot_is() {
     let connector = connector(None, Some(served(FakePart::Camera)));
@@ -143,6 +230,7 @@ fn freehand_a_person_types_where_the_robot_is() {
     let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
     let frame = image(camera.as_mut(), None);
     assert_eq!(frame.base_from_tip, None, "nobody has said where the robot is");
+    assert!(frame.no_pose.is_some_and(|why| why.say(Language::English).contains("pendant")));
     let pose = Pose::from_translation_xyzw([0.4, -0.1, 0.3], [0.0, 1.0, 0.0, 0.0]);
     control.type_pose(Some(pose)).expect("taken");
     assert_eq!(control.state().expect("connected").map(|state| state.base_from_tip), Some(pose));

@@ -213,6 +213,8 @@ pub fn frame(number: u64) -> Event {
         number,
         sim_time_s: 12.3,
         image_age_s: 0.0,
+        image_off_m: 0.0,
+        no_pose: None,
         received_s: 100.0,
         rate_hz: 20.0,
         depth_range_m: [0.4, 1.2],

@@ -152,6 +152,8 @@ pub fn connected() -> Model {
         number: 1,
         sim_time_s: 12.3,
         image_age_s: 0.0,
+        image_off_m: 0.0,
+        no_pose: None,
         received_s: 99.98,
         rate_hz: 20.0,
         depth_range_m: [0.3, 0.5],
@@ -194,7 +196,7 @@ pub fn captured() -> Model {
 const FINDINGS: FindingOptions = FindingOptions::with_goal_mm(Some(0.5));
 
 /// What was seen in the captures of the fit.
-fn observations() -> Observations {
+pub fn observations() -> Observations {
     let views = (1..=FITTED).map(|n| ObservedView::new(record(n).image, Some(base_from_tip(n)), Some(corners(n))));
     Observations {
         mode: Some(Mode::EyeInHand),

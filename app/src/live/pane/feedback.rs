@@ -45,7 +45,8 @@ pub fn badges_ui(
         let words = text!("{rate} fps · {age} s old", rate = format!("{rate:.0}"), age = format!("{age_s:.1}"));
         let colour = if stale { Marks::over_images().review } else { Color32::from_gray(215) };
         lines.push((words.say(language), colour));
-        if frame.info.image_age_s > 0.0 {
+        // What is less than the error that is good enough is no reason to wait.
+        if frame.info.image_off_m > model.view.goal.0 {
             let ms = format!("{:.0}", frame.info.image_age_s * 1e3);
             let words = text!("Image up to {ms} ms older than the pose: let the arm stand", ms = ms);
             lines.push((words.say(language), Marks::over_images().review));

@@ -53,7 +53,15 @@ fn an_image_that_may_be_older_than_its_pose_says_by_how_much() {
     assert!(!pane.sees("older than the pose"), "all of it is of one instant");
     let mut model = sample::connected();
     model.frame.as_mut().expect("a frame").info.image_age_s = 0.05;
-    assert!(colour(model).sees("Image up to 50 ms older than the pose"));
+    assert!(!colour(model.clone()).sees("older than the pose"), "the arm stands");
+    model.frame.as_mut().expect("a frame").info.image_off_m = 0.01;
+    assert!(colour(model.clone()).sees("Image up to 50 ms older than the pose"));
+    let info = &mut model.frame.as_mut().expect("a frame").info;
+    (info.image_age_s, info.image_off_m) = (1e-3, 0.25e-3);
+    assert!(
+        !colour(model).sees("older than the pose"),
+        "less than the error that is good enough, at a quarter of a metre a second"
+    );
 }
 
 #[test]

@@ -38,14 +38,17 @@ impl Blocked {
         } else {
             None
         };
+        let is_known = model.cell.as_ref().is_none_or(|cell| cell.arm.is_some());
         let knows_kinematics = match model.moves() {
             // The controller has its own.
-            Moves::OnceArmed { tip, .. } => tip,
-            Moves::Freely | Moves::Never => model.cell.as_ref().is_none_or(|cell| cell.arm.is_some()),
+            Moves::OnceArmed { joints, tip } => tip || (joints && is_known),
+            Moves::Freely | Moves::Never => is_known,
         };
-        let tip = arm.or_else(|| {
-            (!knows_kinematics)
-                .then(|| tr!(language, "This arm's kinematics is not known, so only its joints can be moved"))
+        let is_doubted = model.cell.as_ref().is_some_and(|cell| cell.arm_doubt.is_some());
+        let tip = arm.or_else(|| match knows_kinematics {
+            true => None,
+            false if is_doubted => unknown_arm(model),
+            false => Some(tr!(language, "This arm's kinematics is not known, so only its joints can be moved")),
         });
         Self { arm, tip, can_start: resting.is_some() }
     }

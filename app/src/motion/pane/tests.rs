@@ -10,8 +10,8 @@ use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    Axis, CellSource, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion, MotionGoal, MotionId, Pane,
-    Severity, Simulation,
+    ArmDoubt, Axis, CellFacts, CellSource, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion, MotionGoal,
+    MotionId, Pane, Severity, Simulation,
 };
 use crate::text::Text;
 
@@ -285,6 +285,23 @@ fn an_arm_of_unknown_kinematics_has_its_joints_jogged_only() {
     assert!(pane.sees("kinematics is not known"));
     assert!(!pane.is_enabled("Turn +X"));
     assert!(pane.is_enabled("Jog joint 1 +"));
+}
+
+#[test]
+fn an_arm_that_takes_joint_values_alone_is_moved_along_axes_once_its_chain_is_known() {
+    let alone = |change: fn(&mut CellFacts)| {
+        let mut model = sample::connected();
+        let cell = model.cell.as_mut().expect("connected");
+        cell.moves = Moves::OnceArmed { joints: true, tip: false };
+        change(cell);
+        driven(model)
+    };
+    let known = alone(|_| ());
+    assert!(!known.sees("kinematics is not known") && known.is_enabled("Move +X") && known.is_enabled("Turn +X"));
+    let open = alone(|cell| (cell.arm, cell.arm_doubt) = (None, Some(ArmDoubt::Open)));
+    assert!(open.sees("let it stand at four places") && !open.is_enabled("Move +X"));
+    assert!(!open.sees("kinematics is not known"), "it is named, and not placed yet");
+    assert!(alone(|cell| cell.arm = None).sees("kinematics is not known"));
 }
 
 #[test]

@@ -5,6 +5,12 @@ use crate::tr;
 
 /// Why the arm cannot be sent anywhere now.
 pub fn immovable(model: &Model) -> Option<&'static str> {
+    let is_busy = model.sequence_runs || model.planning;
+    unmovable(model).or_else(|| is_busy.then(|| tr!(model.view.language, "A sequence is under way")))
+}
+
+/// Why the arm cannot be moved, not even by the sequence that is under way.
+pub fn unmovable(model: &Model) -> Option<&'static str> {
     let language = model.view.language;
     if !model.control.is_connected() || !model.mover.is_connected() {
         Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
@@ -12,8 +18,6 @@ pub fn immovable(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "The arm moves only while the simulation runs"))
     } else if !model.is_armed() {
         Some(tr!(language, "The robot is only read until you let the workbench move it, in Jog"))
-    } else if model.sequence_runs || model.planning {
-        Some(tr!(language, "A sequence is under way"))
     } else {
         None
     }

@@ -6,7 +6,7 @@ pub mod sequence;
 mod teach;
 
 use egui::Ui;
-pub use immovable::immovable;
+pub use immovable::{immovable, unmovable};
 
 use crate::command::Outbox;
 use crate::gui::style::parts;

@@ -81,7 +81,7 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &
 /// The button that goes on with a sequence that was broken off.
 pub fn continue_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
-    if sequence.current().is_none() {
+    if !sequence.can_continue() {
         return;
     }
     let button = Button::new(tr!(language, "Continue the sequence"));

@@ -97,6 +97,8 @@ impl Table {
             number: self.frames,
             sim_time_s: self.frames as f64 * 0.05,
             image_age_s: 0.0,
+            image_off_m: 0.0,
+            no_pose: None,
             received_s: *now_s,
             rate_hz: 20.0,
             depth_range_m: [0.1, 3.5],

@@ -5,12 +5,16 @@ use rand_chacha::ChaCha8Rng;
 
 use super::candidates::ViewRange;
 use super::design::Design;
+use crate::estimate::Observations;
+use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{ExpectedView, ViewModel};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::plan::carried::Carried;
 use crate::plan::clearance::{Arm, travel};
 use crate::plan::contact::Guard;
 use crate::plan::pace::Pace;
+use crate::plan::sight::Sight;
 use crate::plan::surroundings::Surroundings;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
@@ -40,6 +44,8 @@ pub struct Robot {
     pub joints: JointValues,
     /// How fast they are driven.
     pub pace: Pace,
+    /// Camera and board, where they are known: the arm keeps out of the line of sight.
+    pub sight: Option<Sight>,
 }
 
 /// What is asked of a plan.
@@ -309,11 +315,17 @@ impl Chooser<'_> {
 impl Robot {
     fn way_to(&self, base_from_tip: &Pose<Base, Tip>) -> Way {
         match self.arm.reach(base_from_tip, &self.joints) {
-            Some(joints) if self.arm.is_free(&joints, &self.around, self.clearance_m) => {
+            Some(joints) if self.is_good(&joints, base_from_tip) => {
                 Way::To { joints: Some(joints), travel_s: self.travel_s(&self.joints, &joints) }
             }
             _ => Way::None,
         }
+    }
+
+    /// Whether the arm touches nothing with these joint values, at which its tip is there, and is not between camera and board.
+    pub fn is_good(&self, joints: &JointValues, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let sees = |sight: &Sight| sight.is_free(&self.arm, joints, base_from_tip);
+        self.arm.is_free(joints, &self.around, self.clearance_m) && self.sight.as_ref().is_none_or(sees)
     }
 
     /// Whether the arm can be driven there on a straight path in joint space without touching anything. What it is nearer to than
@@ -330,6 +342,26 @@ impl Robot {
         let speed = self.arm.joint_speed(from, to, &self.around, self.pace.speed);
         Pace { speed, ..self.pace }.duration_s(travel(from, to))
     }
+}
+
+/// The arm with what is on its tip, the camera or the board, where the estimate has it; and the other one of the two among
+/// what stands around, with some room about the board wherever it is, and about a camera beside the robot; with the line of
+/// sight between them.
+pub(super) fn with_board(robot: &Robot, hand_eye: &HandEye, observations: &Observations, room_m: f64) -> Robot {
+    let mut robot = robot.clone();
+    let target = &observations.target;
+    robot.sight = Some(Sight::new(hand_eye, target));
+    match hand_eye {
+        HandEye::EyeInHand { tip_from_camera, base_from_target } => {
+            robot.arm.carried = vec![Carried::camera(tip_from_camera.isometry())];
+            robot.around.obstacles.push(crate::plan::sheet(target, base_from_target, room_m));
+        }
+        HandEye::EyeToHand { base_from_camera, tip_from_target } => {
+            robot.arm.carried = vec![Carried::board(target, tip_from_target, room_m)];
+            robot.around.obstacles.push(crate::plan::housing(base_from_camera, room_m));
+        }
+    }
+    robot
 }
 
 fn proposals(pool: &[Candidate], design: &Design, chosen: &[usize]) -> Vec<Proposal> {

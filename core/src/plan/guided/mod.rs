@@ -30,18 +30,17 @@ use nalgebra::Point3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::estimate::claim::Claim;
-use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, ViewModel};
 use crate::estimate::uncertainty::quality::TipBox;
 use crate::estimate::{Calibration, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
-use crate::plan::{Carried, Contact};
+use crate::plan::Contact;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use candidates::ViewRange;
-use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot};
+use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot, with_board};
 use design::Design;
 
 /// Views from which on an end is possible: from as many on errors of the robot that depend on where it stands are looked for,
@@ -531,24 +530,6 @@ impl Guide {
         }
         (known.elapsed_s >= self.options.most_s).then_some(Ending::MostTime)
     }
-}
-
-/// The arm with what is on its tip, the camera or the board, where the estimate has it; and the other one of the two among
-/// what stands around, with some room about the board wherever it is, and about a camera beside the robot.
-fn with_board(robot: &Robot, hand_eye: &HandEye, observations: &Observations, room_m: f64) -> Robot {
-    let mut robot = robot.clone();
-    let target = &observations.target;
-    match hand_eye {
-        HandEye::EyeInHand { tip_from_camera, base_from_target } => {
-            robot.arm.carried = vec![Carried::camera(tip_from_camera.isometry())];
-            robot.around.obstacles.push(super::sheet(target, base_from_target, room_m));
-        }
-        HandEye::EyeToHand { base_from_camera, tip_from_target } => {
-            robot.arm.carried = vec![Carried::board(target, tip_from_target, room_m)];
-            robot.around.obstacles.push(super::housing(base_from_camera, room_m));
-        }
-    }
-    robot
 }
 
 /// What a choice stands on.

@@ -183,7 +183,7 @@ fn reached(robot: Option<&Robot>, base_from_tip: &Pose<Base, Tip>) -> Option<Opt
     let Some(robot) = robot else { return Some(None) };
     let joints = robot.arm.reach(base_from_tip, &robot.joints)?;
     let is_free = travel(&robot.joints, &joints) <= LARGEST_FAN_WAY_RAD
-        && robot.arm.is_free(&joints, &robot.around, robot.clearance_m)
+        && robot.is_good(&joints, base_from_tip)
         && robot.path_is_free(&joints);
     is_free.then_some(Some(joints))
 }

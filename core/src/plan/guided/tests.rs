@@ -1,11 +1,13 @@
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
 use crate::estimate::claim::Alternative;
-use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::{HandEye, Mode};
+use crate::geometry::arm::ArmKind;
+use crate::plan::{ArmBody, Carried, Surroundings};
 use crate::testing::clutter::{Tally, session};
-use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
-use crate::testing::sessions::REALISTIC;
+use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places};
+use crate::testing::sessions::{BOARD, REALISTIC, camera};
 
 fn options(goal_m: f64) -> GuidedOptions {
     GuidedOptions { goal_m, candidates: 300, ..GuidedOptions::default() }
@@ -68,6 +70,84 @@ fn a_board_near_the_edge_of_the_image_is_tilted_by_a_rough_answer_until_the_lens
         );
         assert!((1..=6).contains(&tilts) && run.failed <= 2, "{arm:?} {mode:?}: {tilts} tilts, {} failed", run.failed);
     }
+}
+
+/// The arm with a board on its tip, and a camera on the side of its base, with the arm between both in many poses.
+fn camera_at_the_base(seed: u64) -> Option<GuidedCell> {
+    let part = |k: u64| ((seed * 37 + k * 101) % 97) as f64 / 97.0 - 0.5;
+    let chain = ArmKind::Ur5e.arm();
+    let board_at = Vector3::new(0.45 + 0.1 * part(1), 0.2 * part(2), 0.45 + 0.1 * part(3));
+    let eye = board_at + Vector3::new(-0.35, 0.5 * part(4), 0.25 + 0.2 * part(5));
+    let base_from_camera = Isometry3::face_towards(&eye.into(), &board_at.into(), &Vector3::z());
+    let on_tip = Isometry3::from_parts(
+        Vector3::new(0.0, 0.0, 0.05).into(),
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
+    ) * Translation3::from(-BOARD.centre().coords);
+    let seen_first =
+        Isometry3::translation(0.0, 0.0, (board_at - eye).norm()) * Translation3::from(-BOARD.centre().coords);
+    let arm = crate::plan::Arm {
+        body: ArmBody::of(&chain),
+        chain,
+        world_from_arm: Isometry3::identity(),
+        connection_from_tip: Isometry3::identity(),
+        carried: Vec::new(),
+    };
+    let first_tip = Pose::from_isometry(base_from_camera * seen_first * on_tip.inverse());
+    let joints = arm.reach(&first_tip, &[std::f64::consts::PI, -1.6, 1.9, -1.9, -1.57, 0.0])?;
+    let places = Places {
+        arm,
+        joints,
+        around: Surroundings::default(),
+        mount_from_camera: Pose::from_isometry(base_from_camera),
+        anchor_from_target: Pose::from_isometry(on_tip),
+        intrinsics: camera(),
+    };
+    GuidedCell::placed(CellSetup::new(CellArm::Ur5e, Mode::EyeToHand, seed), places)
+}
+
+/// Whether a link other than the last is between the camera and a corner of the board, looked at point by point.
+fn is_hidden(cell: &GuidedCell, joints: &[f64]) -> bool {
+    let chain = &cell.robot.arm.chain;
+    let frames = chain.frames(joints).expect("its joints");
+    let at: Vec<Isometry3<f64>> = crate::plan::links::arm_from_links(&frames).collect();
+    let links = crate::plan::links::capsules(chain);
+    let last = links.iter().map(|link| link.link).max();
+    let eye = Point3::from(cell.mount_from_camera.translation());
+    let tip = cell.robot.arm.tip(joints).expect("its joints");
+    BOARD.points().iter().any(|point| {
+        let corner = tip.isometry() * cell.anchor_from_target.isometry() * point;
+        (5..95).any(|percent| {
+            let here = eye + (corner - eye) * (f64::from(percent) / 100.0);
+            links.iter().filter(|link| Some(link.link) != last).any(|link| {
+                let (from, to) = (at[link.link] * link.from, at[link.link] * link.to);
+                let along = (to - from).dot(&(here - from)) / (to - from).norm_squared();
+                (here - (from + (to - from) * along.clamp(0.0, 1.0))).norm() < link.radius_m
+            })
+        })
+    })
+}
+
+/// No image shows the board through a forearm.
+#[test]
+fn no_pose_is_proposed_with_the_arm_between_camera_and_board() {
+    let (mut cells, mut poses) = (0, 0);
+    for cell in (0..60).filter_map(camera_at_the_base) {
+        if is_hidden(&cell, &cell.robot.joints) {
+            // As it was placed; a person would have moved it.
+            continue;
+        }
+        let run = cell.clone().run(GuidedOptions { most_views: 8, ..options(1e-9) });
+        cells += 1;
+        for step in &run.steps {
+            let joints = step.joints.expect("the chain is known");
+            assert!(!is_hidden(&cell, &joints), "pose {poses} of cell {cells}: {joints:?}");
+            poses += 1;
+        }
+        if cells == 6 {
+            break;
+        }
+    }
+    assert!(cells >= 3 && poses >= 20, "{poses} poses in {cells} cells are too few to say so");
 }
 
 /// Nothing is known of the camera at first, so the arm hardly moves.

@@ -126,6 +126,16 @@ pub(super) fn rgb(folder: &Path, capture: &CaptureRecord) -> Result<RgbImage, Se
     image_file::load_rgb(&path).map_err(|e| SessionError::unreadable(&path, &e))
 }
 
+impl CaptureRecord {
+    /// Its depth in metres, from the folder of its session; `None` when none was recorded.
+    ///
+    /// # Errors
+    /// [`SessionError`] when the file is damaged, truncated or gone.
+    pub fn load_depth_m(&self, folder: &Path) -> Result<Option<DepthImage>, SessionError> {
+        depth_m(folder, self)
+    }
+}
+
 pub(super) fn depth_m(folder: &Path, capture: &CaptureRecord) -> Result<Option<DepthImage>, SessionError> {
     let Some(name) = &capture.depth else { return Ok(None) };
     let path = folder.join(name);

@@ -58,6 +58,7 @@ impl Held {
         // The conversation broke: a server that is still there must not stay held, and what was read, also by calls that
         // went well, may be of more than one instant.
         sim.connection().renew();
-        outcome.and(Err(LinkError::Disconnected { call: "sim.releaseLock".to_owned() }))
+        let broken = sim.connection().broken_off("sim.releaseLock");
+        outcome.and(Err(broken))
     }
 }

@@ -38,7 +38,9 @@ impl Arm {
                 tracing::info!(%error, "the motion is made in a single call");
                 let outcome = self.sim.move_to_pose(&motion, &CallOptions::long(LONGEST_MOTION, cancel));
                 match outcome {
-                    Err(LinkError::Cancelled { .. } | LinkError::Timeout { .. }) => self.stop().and(outcome),
+                    Err(LinkError::Cancelled { .. } | LinkError::Timeout { .. } | LinkError::OwnCellSilent { .. }) => {
+                        self.stop().and(outcome)
+                    }
                     outcome => outcome,
                 }
             }
@@ -91,7 +93,13 @@ impl Arm {
         match &outcome {
             Ok(()) => self.sim.move_to_pose_cleanup(state),
             // A server that has gone or hangs drives nothing now, and asking it to tidy up only takes time.
-            Err(LinkError::Disconnected { .. } | LinkError::Timeout { .. } | LinkError::Unreachable { .. }) => outcome,
+            Err(
+                LinkError::Disconnected { .. }
+                | LinkError::Timeout { .. }
+                | LinkError::Unreachable { .. }
+                | LinkError::OwnCellSilent { .. }
+                | LinkError::OwnCellEnded { .. },
+            ) => outcome,
             // The arm has to stand before the caller hears of it. If it cannot be told to, that is the worse news.
             Err(_) => self.stop().and(self.sim.move_to_pose_cleanup(state)).and(outcome),
         }

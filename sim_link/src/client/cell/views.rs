@@ -100,6 +100,7 @@ impl ArmKinematics {
             clearance_m: ViewOptions::default().clearance_m,
             joints: *joints,
             pace,
+            sight: None,
         }
     }
 

@@ -3,6 +3,7 @@
 //! The run talks to the driver through the same connection that the workbench uses, so what passes here works there. A
 //! message that breaks the protocol ends a connection, and so the run: the first one is reported with its line.
 
+mod capture;
 mod motion;
 mod reading;
 mod report;
@@ -76,12 +77,13 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn all(&self, report: &mut Report) -> Result<(), ()> {
-        let checks: [(&'static str, Checked<'a>); 8] = [
+        let checks: [(&'static str, Checked<'a>); 9] = [
             ("hello", Self::hello),
             ("clock", Self::clock),
             ("states", Self::states),
             ("chain", Self::chain),
             ("images", Self::images),
+            ("capture", Self::capture),
             ("later versions", Self::later_versions),
             ("read-only", Self::read_only),
             ("motion", Self::motion),

@@ -6,6 +6,7 @@ use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use super::super::limits;
 use super::super::message::Ability;
 use super::super::motion::{Goal, MoveEnd, move_message};
 use super::super::shared::{Inner, Progress};
@@ -25,8 +26,6 @@ const UNDER_WAY: Duration = Duration::from_millis(150);
 const SILENCE: Duration = Duration::from_secs(1);
 /// With what braking takes.
 const QUIET: Duration = Duration::from_millis(2500);
-/// How far from its goal a joint, or the tip, may say that it stands.
-const REACHED: f64 = 2e-3;
 /// How far an arm at rest may creep in a tenth of a second.
 const AT_REST: f64 = 1e-3;
 
@@ -114,15 +113,40 @@ impl Run<'_> {
         // The state that says so may be a moment behind.
         self.wait(name, Duration::from_millis(200))?;
         let here = self.here(name)?;
-        let off = far(&here, goal);
-        if off > REACHED {
-            let why = format!("`done` after `move`, and the newest state is {off:.4} rad or m from the goal");
+        let [off_rad, off_m] = self.off(&here, goal);
+        if off_rad > limits::GOAL_RAD || off_m > limits::GOAL_M {
+            let why = format!(
+                "`done` after `move`, and the newest state is {:.1} mrad and {:.1} mm from the goal: {} mrad and {} mm at the most",
+                off_rad * 1e3,
+                off_m * 1e3,
+                limits::GOAL_RAD * 1e3,
+                limits::GOAL_M * 1e3
+            );
             return Err(wrong(name, why));
         }
         if here.moving == Some(true) {
             return Err(wrong(name, "`done` after `move`, and the newest state has `moving` true"));
         }
         Ok(())
+    }
+
+    /// How far the arm is from a goal \[rad, m\].
+    fn off(&self, reading: &Reading, goal: &Goal) -> [f64; 2] {
+        match (goal, &reading.joints) {
+            (Goal::Joints(goal), Some(here)) => {
+                let mut off = [0.0_f64; 2];
+                for ((a, b), joint) in goal.iter().zip(here).zip(&self.driver.hello().joints) {
+                    let kind = usize::from(joint.kind == JointKind::Prismatic);
+                    off[kind] = off[kind].max((a - b).abs());
+                }
+                off
+            }
+            (Goal::Joints(_), None) => [0.0; 2],
+            (Goal::Tip(goal), _) => {
+                let (off_m, off_rad) = goal.distance_to(&reading.base_from_tip);
+                [off_rad, off_m]
+            }
+        }
     }
 
     /// Begins a motion, ends it, and looks whether the arm stands. False when it was there before.

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::super::limits;
 use super::super::message::Ability;
 use super::super::placement::{ChainPlacement, NEED as PLACES_NEEDED};
 use super::super::shared::Inner;
@@ -10,12 +11,8 @@ use super::{Check, Run, gone, passed, skipped, warning, wrong};
 
 /// How long clock and states are watched.
 const WATCHED: Duration = Duration::from_millis(1500);
-/// Longest wait for an image: the longest exposure and then some.
-const IMAGE_PATIENCE: Duration = Duration::from_secs(5);
 /// A driver's seconds may differ from ours by this part: pongs of a second and a half come with some milliseconds.
 const RATE_TOLERANCE: f64 = 0.05;
-/// Stamps farther than this from the present \[s\] are of another clock than the pongs, or of an image that waited long.
-const OLDEST_S: f64 = 1.0;
 /// A stamp that is this much in the future \[s\] is of another clock.
 const FUTURE_S: f64 = 0.05;
 /// States a second that the protocol asks for, with what one and a half seconds can tell.
@@ -58,8 +55,7 @@ impl Run<'_> {
         if !self.can(Ability::State) {
             return Ok(skipped(NAME, "it sends none: poses have to be given by hand"));
         }
-        let patience = self.options.driver.answer;
-        let first = gone(NAME, self.driver.first_state(patience, self.cancel))?;
+        let first = gone(NAME, self.driver.first_state(limits::FIRST, self.cancel))?;
         self.in_range(NAME, &first.reading)?;
         let count = |inner: &mut Inner| (inner.state_count, inner.states.newest().map_or(0.0, |newest| newest.stamp_s));
         let (before, before_s) = self.driver.shared().update(count);
@@ -132,10 +128,10 @@ impl Run<'_> {
     }
 
     /// A stamp is near the present on the clock of the pongs.
-    fn of_this_clock(&self, name: &'static str, stamp_s: f64) -> Result<f64, Check> {
+    pub(super) fn of_this_clock(&self, name: &'static str, stamp_s: f64) -> Result<f64, Check> {
         let Some(offset) = self.driver.clock() else { return Err(wrong(name, "no pong has related the clocks")) };
         let age_s = self.driver.timebase().now_s() - offset.offset_s - stamp_s;
-        if (-FUTURE_S..=OLDEST_S).contains(&age_s) {
+        if (-FUTURE_S..=limits::IMAGE_AGE_S).contains(&age_s) {
             return Ok(age_s);
         }
         let when = if age_s > 0.0 { "before" } else { "after" };
@@ -156,13 +152,12 @@ impl Run<'_> {
         let mut after = None;
         let mut ages_s = Vec::new();
         for _ in 0..3 {
-            let image = gone(NAME, self.driver.image(after, IMAGE_PATIENCE, self.cancel))?;
+            let patience = if after.is_none() { limits::FIRST } else { limits::IMAGE_WAIT };
+            let image = gone(NAME, self.driver.image(after, patience, self.cancel))?;
             let Some(image) = image else {
-                let why = match after {
-                    None => "`next_image` with after null is not answered within 5 s".to_owned(),
-                    Some(stamp) => format!("`next_image` with after {stamp} is not answered within 5 s"),
-                };
-                return Err(wrong(NAME, why));
+                let after = after.map_or_else(|| "null".to_owned(), |stamp: f64| stamp.to_string());
+                let seconds = patience.as_secs();
+                return Err(wrong(NAME, format!("`next_image` with after {after} is not answered within {seconds} s")));
             };
             ages_s.push(self.of_this_clock(NAME, image.stamp_s)?);
             if let Some(depth) = &image.depth

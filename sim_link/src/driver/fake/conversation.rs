@@ -9,8 +9,8 @@ use handeye_core::progress::CancelToken;
 use serde::Serialize;
 
 use super::super::message::{
-    Ability, AnswerMessage, DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, JointMessage, LogLevel,
-    LogMessage, PongMessage, PoseMessage, StateMessage, ToDriver,
+    Ability, AnswerMessage, DepthEncoding, DepthMessage, DisarmedMessage, ImageEncoding, ImageMessage, JointMessage,
+    LogLevel, LogMessage, PongMessage, PoseMessage, StateMessage, ToDriver,
 };
 use super::super::motion::Goal;
 use super::super::wire::MAX_LINE;
@@ -272,19 +272,24 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
             return Ok(());
         }
         loop {
+            let mut was_armed = false;
             let moving = {
                 let mut asked = self.lock();
                 if asked.has_ended {
                     return Ok(());
                 }
                 if asked.heard.elapsed() > SILENCE {
-                    asked.is_armed = false;
+                    was_armed = std::mem::take(&mut asked.is_armed);
                     if let Some(motion) = &asked.motion {
                         motion.cancel.cancel();
                     }
                 }
                 asked.motion.is_some()
             };
+            if was_armed {
+                let why = "nothing was heard of the workbench for a second".to_owned();
+                self.send("disarmed", &DisarmedMessage { why }, &[])?;
+            }
             // A cell that was stopped shows nothing.
             if let Some(shown) = camera.shown()?.filter(|shown| shown.sim_time_s != last_s) {
                 last_s = shown.sim_time_s;
@@ -320,8 +325,12 @@ impl<'a, W: Write + Send> Conversation<'a, W> {
             loop {
                 let newest_s = camera.sim().get_simulation_time()?;
                 let is_new = wanted.after.is_none_or(|after| self.stamps().stamp(newest_s) > after);
-                if is_new {
-                    let frame = camera.grab()?;
+                // One that cannot be had whole is late; whoever waits for it has a limit.
+                let grabbed = match is_new.then(|| camera.grab()) {
+                    None | Some(Err(LinkError::MixedInstants { .. })) => None,
+                    Some(grabbed) => Some(grabbed?),
+                };
+                if let Some(frame) = grabbed {
                     let stamp = self.stamps().stamp(frame.sim_time_s);
                     // The mapping of simulated time may have moved meanwhile.
                     if wanted.after.is_none_or(|after| stamp > after) {

@@ -50,12 +50,14 @@ pub struct FakeOptions {
     pub part: FakePart,
     /// Where its clock begins \[s\].
     pub clock_s: f64,
+    /// What it says that it cannot do.
+    pub cannot: Vec<Ability>,
 }
 
 impl FakeOptions {
     /// Robot and camera of this scene.
     pub fn new(scene: Scene) -> Self {
-        Self { scene, seed: None, connect: None, part: FakePart::Both, clock_s: 0.0 }
+        Self { scene, seed: None, connect: None, part: FakePart::Both, clock_s: 0.0, cannot: Vec::new() }
     }
 }
 
@@ -91,6 +93,7 @@ pub enum FakeError {
 pub struct Fake {
     endpoint: Endpoint,
     paths: CellPaths,
+    link: ConnectionOptions,
     hello: Hello,
     /// Where the tip is on the flange that it reports beside the tip; of a chain that it names.
     flange_from_tip: Option<Isometry3<f64>>,
@@ -104,7 +107,7 @@ impl Fake {
     /// # Errors
     /// [`FakeError`].
     pub fn start(options: FakeOptions) -> Result<Self, FakeError> {
-        let FakeOptions { mut scene, seed, connect, part, clock_s } = options;
+        let FakeOptions { mut scene, seed, connect, part, clock_s, cannot } = options;
         let mut chain = None;
         let (server, endpoint, paths) = if let Some(endpoint) = connect {
             (None, endpoint, CellPaths::default())
@@ -116,7 +119,7 @@ impl Fake {
             let endpoint = server.endpoint().parse()?;
             (Some(server), endpoint, paths)
         };
-        let link = ConnectionOptions::default();
+        let link = if server.is_some() { ConnectionOptions::own_cell() } else { ConnectionOptions::default() };
         let mut arm = Arm::connect(&endpoint, &link, &paths)?;
         if !arm.info().is_handeye_cell {
             return Err(FakeError::OtherCell { endpoint });
@@ -133,9 +136,10 @@ impl Fake {
         }
         let chain = chain.filter(|_| part != FakePart::Camera);
         let flange_from_tip = chain.as_ref().map(|chain| chain.flange_from_tip);
-        let hello = hello(&mut arm, part, chain)?;
+        let mut hello = hello(&mut arm, part, chain)?;
+        hello.can.retain(|ability| !cannot.contains(ability));
         let stamps = Mutex::new(Stamps::new(clock_s));
-        Ok(Self { endpoint, paths, hello, flange_from_tip, stamps, _server: server })
+        Ok(Self { endpoint, paths, link, hello, flange_from_tip, stamps, _server: server })
     }
 
     /// Serves one workbench until it leaves or is gone. The arm is then at rest.
@@ -147,11 +151,11 @@ impl Fake {
     }
 
     fn arm(&self) -> Result<Arm, LinkError> {
-        Arm::connect(&self.endpoint, &ConnectionOptions::default(), &self.paths)
+        Arm::connect(&self.endpoint, &self.link, &self.paths)
     }
 
     fn camera(&self) -> Result<CameraFeed, LinkError> {
-        CameraFeed::connect(&self.endpoint, &ConnectionOptions::default(), &self.paths)
+        CameraFeed::connect(&self.endpoint, &self.link, &self.paths)
     }
 }
 

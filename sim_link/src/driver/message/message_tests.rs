@@ -42,7 +42,9 @@ fn every_message_of_the_page_is_one() {
 #[test]
 fn the_page_names_every_type_every_ability_and_every_limit() {
     let names = ["hello", "ping", "next_image", "arm", "move", "stop", "bye"];
-    let names = names.into_iter().chain(["pong", "state", "image", "depth", "accepted", "done", "stopped", "refused"]);
+    let names = names
+        .into_iter()
+        .chain(["pong", "state", "image", "depth", "accepted", "done", "stopped", "refused", "disarmed"]);
     let names =
         names.chain(["log", "error", "joints", "move_joints", "move_tip", "rgb8", "bgr8", "mono8", "jpeg", "png"]);
     for name in

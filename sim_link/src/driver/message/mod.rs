@@ -105,6 +105,13 @@ pub struct AnswerMessage {
     pub why: String,
 }
 
+/// The driver has taken back by itself that it may move the arm.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DisarmedMessage {
+    /// Why, for people.
+    pub why: String,
+}
+
 /// How much a log line matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -155,6 +162,8 @@ pub enum FromDriver {
     Stopped(AnswerMessage),
     /// What was asked for is not begun.
     Refused(AnswerMessage),
+    /// The driver no longer moves the arm, by itself.
+    Disarmed(DisarmedMessage),
     /// For the log.
     Log(LogMessage),
     /// The driver cannot go on and ends.
@@ -194,6 +203,7 @@ impl FromDriver {
             "done" => Self::Done(body(kind, line)?),
             "stopped" => Self::Stopped(body(kind, line)?),
             "refused" => Self::Refused(body(kind, line)?),
+            "disarmed" => Self::Disarmed(body(kind, line)?),
             "log" => Self::Log(body(kind, line)?),
             "error" => Self::Error(body(kind, line)?),
             _ => Self::Unknown(header.kind),

@@ -32,6 +32,23 @@ fn the_fake_driver_passes_its_own_test_in_a_process_and_over_tcp() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
 }
 
+/// As somebody does who wants to see what it says.
+#[test]
+fn a_driver_that_is_started_in_a_terminal_says_for_what_it_waits() {
+    let mut driver = Command::new(handeye_binary())
+        .args(["driver", "rosbridge", "--url", "ws://127.0.0.1:9"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("handeye runs");
+    let mut line = String::new();
+    BufReader::new(driver.stderr.take().expect("its errors")).read_line(&mut line).expect("a line");
+    drop(driver.stdin.take());
+    driver.wait().expect("it ends with its input");
+    assert!(line.contains("waits for `hello`") && line.contains("handeye driver test"), "{line}");
+}
+
 #[test]
 fn an_author_is_told_what_is_wrong_with_the_line_and_by_the_exit_code() {
     let Some(python) = python() else { return };

@@ -1,0 +1,44 @@
+//! What the workbench asks of a driver in numbers. `docs/drivers.md` has them for those who write one, and a test holds both
+//! together.
+
+use std::time::Duration;
+
+use handeye_core::capture::NO_IMAGES_S;
+
+/// The states before and after an image are no farther apart than this \[s\]: they say too little of what was between them.
+pub const STATES_APART_S: f64 = 0.25;
+/// An image waits for the state after it for so long: three of the slowest driver.
+pub const STATE_AFTER_IMAGE: Duration = Duration::from_millis(300);
+/// An image is no older than this when it is here \[s\]: what is seen is to be what is done.
+pub const IMAGE_AGE_S: f64 = 1.0;
+/// The first state and the first image come within this time after `hello`, which is answered before anything slow is loaded.
+pub const FIRST: Duration = Duration::from_secs(10);
+/// The next image comes within this time: as long as a capture waits for one.
+pub const IMAGE_WAIT: Duration = Duration::from_secs(NO_IMAGES_S as u64);
+/// After `done` each joint is this close to its goal \[rad\], and so is the orientation of a tip that was sent to a pose.
+pub const GOAL_RAD: f64 = 2e-3;
+/// The same of a prismatic joint and of the place of a tip \[m\].
+pub const GOAL_M: f64 = 2e-3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_about_drivers_states_the_limits_that_are_asked_for() {
+        const PAGE: &str = include_str!("../../../docs/drivers.md");
+        let table = PAGE.split("## Limits").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("a section");
+        let stated = [
+            format!("{STATES_APART_S} s apart"),
+            format!("at the most {} s after it", STATE_AFTER_IMAGE.as_secs_f64()),
+            format!("within {} s after `hello`", FIRST.as_secs()),
+            format!("{IMAGE_AGE_S} s old"),
+            format!("within {} s", IMAGE_WAIT.as_secs()),
+            format!("{} mrad", GOAL_RAD * 1e3),
+            format!("{} mm", GOAL_M * 1e3),
+        ];
+        for limit in stated {
+            assert!(table.contains(&limit), "{limit} is not in:{table}");
+        }
+    }
+}
