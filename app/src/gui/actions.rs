@@ -5,6 +5,7 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 
 use crate::command::Command;
 use crate::model::{CapturePurpose, CellSource, Dialog, Model, Pane, Step, ThemeChoice};
+use crate::taught::pane::immovable;
 use crate::text::Language;
 use crate::tr;
 
@@ -115,6 +116,18 @@ pub fn all(model: &Model, language: Language) -> Vec<Action> {
             group: Group::Work,
             keys: &[],
             command: (connected && model.calibrated().is_some()).then_some(Command::VerifyAtPlanned),
+        },
+        Action {
+            name: tr!(language, "Home: where the arm stood when the cell was connected"),
+            group: Group::Work,
+            keys: &[],
+            command: (connected && model.home.is_some() && immovable(model).is_none()).then_some(Command::GoHome),
+        },
+        Action {
+            name: tr!(language, "Reset the cell"),
+            group: Group::Work,
+            keys: &[],
+            command: (model.source.is_built_in() && !model.sequence_runs).then_some(Command::ResetCell),
         },
         action(tr!(language, "Solve"), Group::Work, &[], Command::Solve),
         action(tr!(language, "Start simulation"), Group::Work, &[], Command::StartSimulation),
