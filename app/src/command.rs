@@ -141,6 +141,8 @@ pub enum Command {
     },
     /// The ten reference poses instead of those that are taught.
     TeachReference,
+    /// Take the taught poses of other cells for those of this one.
+    AdoptTaught,
     /// Taught poses from a file, after those that are there.
     ImportTaught(PathBuf),
     /// Taught poses into a file.
@@ -156,11 +158,15 @@ pub enum Command {
     },
     /// Go on with the sequence that was broken off, at the pose at which it was.
     ContinueSequence,
+    /// Move to where the arm stood when the cell was connected.
+    GoHome,
+    /// Start the built-in cell again.
+    ResetCell,
     /// Choose poses, visit them and capture there until the goal is reached.
     CalibrateForMe,
-    /// Let the arm move to the pose that waits for it.
+    /// Let the arm make the move that waits for it.
     ConfirmMove,
-    /// Leave out the pose that waits, and choose another one.
+    /// Leave out the move that waits; a sequence goes on with another pose.
     SkipMove,
     /// Whether each move to a chosen pose waits to be confirmed.
     SetConfirmMoves(bool),

@@ -22,7 +22,7 @@ use handeye_app::model::{
 };
 use handeye_app::rerun_log::RerunChoice;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
-use handeye_core::project::taught_poses::Goal;
+use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
@@ -35,6 +35,10 @@ const PATIENCE: Duration = Duration::from_mins(2);
 /// Captures of a calibration, and for its verification.
 const CAPTURES: usize = 10;
 const VERIFIED: usize = 2;
+
+fn reference_poses() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml")
+}
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -162,7 +166,10 @@ impl Way {
             model.frame.as_ref().is_some_and(|frame| frame.info.base_from_tip.is_some())
         })?;
         self.allow()?;
+        self.click(Command::ImportTaught(reference_poses()));
+        self.until("the poses", |model| model.taught().len() == CAPTURES)?;
         self.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+        self.click(Command::ConfirmMove);
         if let Some(number) = self.killed.take() {
             self.until("five captures", |model| captured(model) >= 5)?;
             let number = std::fs::read_to_string(number)?;
@@ -171,6 +178,7 @@ impl Way {
             self.until("the driver again", |model| model.camera.is_connected() && !model.is_armed())?;
             self.allow()?;
             self.click(Command::ContinueSequence);
+            self.click(Command::ConfirmMove);
         }
         self.until("ten captures", |model| {
             captured(model) == CAPTURES && !model.sequence_runs && model.motion == Motion::Idle
@@ -178,7 +186,7 @@ impl Way {
     }
 
     fn capture_by_hand(&mut self) -> anyhow::Result<()> {
-        let taught = self.drawn.app().model().document().taught.clone();
+        let taught = TaughtPoses::read(&reference_poses())?.poses;
         let mut before = None;
         for pose in taught.iter().take(CAPTURES) {
             let Goal::Tip(goal) = pose.goal else { bail!("the reference poses are poses of the tip") };

@@ -71,6 +71,16 @@ impl Workbench {
         self.app.apply(command);
     }
 
+    /// Does what a user asks for, and lets the arm make the first move, which is asked for wherever there may be a real arm.
+    ///
+    /// # Panics
+    /// When no move waits.
+    pub fn allow(&mut self, command: Command) {
+        self.click(command);
+        self.until("the first move that waits", |model| model.asked.is_some());
+        self.click(Command::ConfirmMove);
+    }
+
     /// Waits until the model is like that.
     ///
     /// # Panics

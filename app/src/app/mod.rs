@@ -228,10 +228,13 @@ impl App {
             Command::TeachReference => self.teach_reference(),
             Command::ImportTaught(file) => self.import_taught(file),
             Command::ExportTaught(file) => self.export_taught(file),
-            Command::GoToTaught(name) => self.go_to_taught(&name),
+            Command::AdoptTaught => self.adopt_taught(),
+            Command::GoToTaught(name) => self.visit_taught(&name),
             Command::GoToCapture(id) => self.go_to_capture(id),
             Command::RunSequence { purpose } => self.run_sequence(purpose),
             Command::ContinueSequence => self.continue_sequence(),
+            Command::GoHome => self.go_home(),
+            Command::ResetCell => self.reset_cell(),
             Command::CalibrateForMe => self.calibrate_for_me(),
             Command::ConfirmMove => self.confirm_move(),
             Command::SkipMove => self.skip_move(),
@@ -296,12 +299,17 @@ impl App {
             Event::Tick { now_s } => {
                 self.model.now_s = now_s;
                 self.keep_keep_out(false);
+                self.stop_waits();
             }
             Event::Standing(standing) => self.standing_found(standing),
             Event::KeepOutRead(content) => self.keep_out_read(*content),
             Event::Link { link, state } => self.link_changed(link, state),
             Event::Robot(robot) => {
                 self.model.trail.add(robot.base_from_tip.translation().into());
+                self.stop_seen(&robot);
+                if !robot.joints_rad.is_empty() {
+                    self.model.home.get_or_insert(robot.joints_rad);
+                }
                 self.model.robot = Some(robot);
             }
             Event::NoRobot => self.model.robot = None,
@@ -375,6 +383,8 @@ impl App {
     }
 }
 
+#[cfg(test)]
+mod motion_tests;
 #[cfg(test)]
 mod reasons_tests;
 #[cfg(test)]

@@ -19,6 +19,7 @@ impl App {
     pub(crate) fn stop(&mut self) {
         self.workers.press_stop();
         self.model.sequence_runs = false;
+        self.model.asked = None;
         self.model.planning = false;
         self.cancel_capture();
         self.model.stop_pending = true;
@@ -36,9 +37,8 @@ impl App {
     }
 
     pub(crate) fn stopped(&mut self) {
-        self.model.stop_pending = false;
         self.model.motion = Motion::Idle;
-        self.say(Severity::Info, text!("Arm stopped: every joint stays where it is"));
+        self.watch_stop();
     }
 
     pub(crate) fn start_simulation(&mut self) {
@@ -75,6 +75,10 @@ impl App {
         // Planned poses are those of the other arm.
         self.model.sequence = None;
         self.model.sequence_runs = false;
+        self.model.asked = None;
+        self.model.home = None;
+        self.model.stopping = None;
+        self.model.cells += 1;
         self.model.planning = false;
         self.model.by_hand = None;
         self.model.motion = Motion::Idle;

@@ -116,9 +116,7 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
     let has_poses = !model.document().taught.is_empty();
     let run = |name, purpose| plain(name, Command::RunSequence { purpose }, moves && has_poses);
     let sequence = model.sequence.as_ref().filter(|_| model.sequence_runs);
-    let asks = sequence.is_some_and(|sequence| {
-        sequence.guided.as_deref().is_some_and(|guided| guided.waits == crate::guided::state::Waits::Confirmation)
-    });
+    let asks = model.asked.is_some();
     let hand = model.by_hand.as_ref();
     let blocked = crate::track::pane::Blocked::of(model);
     let may_move = model.is_armed();
@@ -152,7 +150,11 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
             moves && model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_some()),
         ),
         plain(tr!(language, "Stop the sequence"), Command::StopSequence, sequence.is_some()),
-        plain(tr!(language, "Move there"), Command::ConfirmMove, asks && may_move && model.motion == Motion::Idle),
+        plain(
+            tr!(language, "Move there"),
+            Command::ConfirmMove,
+            asks && crate::taught::pane::unmovable(model).is_none() && model.motion == Motion::Idle,
+        ),
         plain(tr!(language, "Skip this pose"), Command::SkipMove, asks),
         plain(
             tr!(language, "Skip this view"),
@@ -160,6 +162,12 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
             hand.is_some_and(|hand| hand.waits == crate::by_hand::state::HandWaits::View),
         ),
         plain(tr!(language, "Stop guiding"), Command::StopGuiding, hand.is_some()),
+        plain(
+            tr!(language, "Home: where the arm stood when the cell was connected"),
+            Command::GoHome,
+            moves && model.home.is_some(),
+        ),
+        plain(tr!(language, "Reset the cell"), Command::ResetCell, model.source.is_built_in() && !model.sequence_runs),
         with(
             tr!(language, "Delete the selected captures"),
             DELETE,

@@ -9,8 +9,8 @@ use crate::gui::style::marks::Marks;
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::{Model, Motion, Pane, PoseSequence};
-use crate::motion::pane::unknown_arm;
-use crate::taught::pane::{immovable, unmovable};
+use crate::motion::pane::{asked_ui, unknown_arm};
+use crate::taught::pane::immovable;
 use crate::text::Text;
 use crate::{text, tr};
 
@@ -69,45 +69,21 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
         return;
     }
     ui.horizontal_wrapped(|ui| {
-        if guided.waits != Waits::Confirmation {
+        if model.asked.is_none() {
             ui.add(Spinner::new().size(14.0).color(Palette::of(ui).busy));
         }
-        ui.label(RichText::new(under_way(sequence, guided).say(language)).strong());
-        if guided.waits == Waits::Confirmation {
-            confirmation_ui(ui, model, outbox);
-        }
+        ui.label(RichText::new(under_way(model, sequence, guided).say(language)).strong());
     });
     if let Some(why) = sequence.last_skipped() {
         let said = text!("The pose before was left out: {why}", why = why.clone());
         parts::notice_ui(ui, Tone::Warning, &said.say(language), |_| ());
     }
+    asked_ui(ui, model, outbox);
     if let Some(why) = &guided.why {
         parts::hint_ui(ui, &why.text().say(language));
     }
     error_ui(ui, model, &guided.guide, left(model, sequence, guided));
     confirm_moves_ui(ui, model, outbox);
-}
-
-/// What a person may do with the pose that waits.
-fn confirmation_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
-    let language = model.view.language;
-    let hindrance = unmovable(model).or_else(|| match model.motion {
-        Motion::Idle => None,
-        _ => Some(tr!(language, "The arm is moving: wait until it stands, or stop it")),
-    });
-    let words = RichText::new(tr!(language, "Move there")).strong().color(Marks::of(ui).on_accent);
-    let button = Button::new(words).fill(Palette::of(ui).accent);
-    let what = tr!(
-        language,
-        "The arm moves straight in joint space to the pose that the 3D pane shows; nothing that is known is touched on the way"
-    );
-    if parts::gated_ui(ui, hindrance, button).on_hover_text(what).clicked() {
-        outbox.send(Command::ConfirmMove);
-    }
-    let what = tr!(language, "Leaves this pose and those near it out, and chooses another one");
-    if ui.button(tr!(language, "Skip this pose")).on_hover_text(what).clicked() {
-        outbox.send(Command::SkipMove);
-    }
 }
 
 /// Whether moves wait to be confirmed; switched on while the arm is on its way, it holds before the next pose.
@@ -141,19 +117,19 @@ fn left(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress) -> Opti
 }
 
 /// What is done now.
-pub fn under_way(sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
+pub fn under_way(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress) -> Text {
     let number = sequence.outcomes.len() + 1;
     match (guided.waits, &guided.ending) {
-        (Waits::Confirmation, Some(_)) => {
+        (_, Some(_)) if model.asked.is_some() => {
             text!("Check {n} of {of} waits for you", n = guided.checked + 1, of = CHECKS)
         }
+        (_, None) if model.asked.is_some() => text!("Pose {n} waits for you", n = number),
         (_, Some(_)) => {
             text!("Check {n} of {of}: a pose that is not in the fit", n = guided.checked + 1, of = CHECKS)
         }
         (Waits::Nothing, None) => text!("Pose {n}: on the way, then a capture", n = number),
         (Waits::Answer, None) => text!("Solving with {n} {n|pose|poses}", n = number - 1),
         (Waits::Choice, None) => text!("Choosing pose {n}", n = number),
-        (Waits::Confirmation, None) => text!("Pose {n} waits for you", n = number),
     }
 }
 

@@ -44,14 +44,12 @@ pub struct GuidedProgress {
 /// What a guided sequence waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Waits {
-    /// For nothing: a pose is under way.
+    /// For nothing: a pose is under way, or waits for the person who lets the arm move.
     Nothing,
     /// For the answer from all captures.
     Answer,
     /// For the next pose.
     Choice,
-    /// For a person who lets the arm move.
-    Confirmation,
 }
 
 impl GuidedProgress {

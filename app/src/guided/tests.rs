@@ -6,8 +6,8 @@ use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    self, ArmDoubt, BoxState, CapturePurpose, CellFacts, CellSource, Jog, LinkState, Model, Motion, Moves,
-    PoseSequence, StopOutcome, WorkBox,
+    self, ArmDoubt, AskedMove, BoxState, CapturePurpose, CellFacts, CellSource, Jog, LinkState, Model, Motion,
+    MotionGoal, Moves, PoseSequence, StopOutcome, WorkBox,
 };
 use crate::text::{Language, Text};
 
@@ -139,7 +139,9 @@ fn guided(model: &mut Model) -> &mut GuidedProgress {
 
 #[test]
 fn a_person_lets_the_arm_move_or_has_another_pose_chosen() {
-    let mut model = under_way(Waits::Confirmation, None);
+    let mut model = under_way(Waits::Nothing, None);
+    let what = Text::verbatim("pose G2");
+    model.asked = Some(AskedMove { goal: MotionGoal::Joints([0.0; 6].into()), what });
     model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
     let mut waiting = pane(model.clone());
     assert!(waiting.sees("Pose 2 waits for you"));

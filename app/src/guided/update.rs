@@ -3,21 +3,16 @@
 use std::sync::Arc;
 
 use handeye_core::estimate::Method;
-use handeye_core::geometry::arm::JointValues;
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::plan::guided::{CHECKS, Ending, Next};
-use handeye_core::plan::travel;
 
 use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits, ended, options};
 use crate::app::App;
 use crate::model::{CapturePurpose, MotionId, Pane, PoseSequence, Severity, SolveStatus, StopOutcome};
+use crate::motion::way::has_moved;
 use crate::session::archive::ArchiveTask;
 use crate::text;
 use crate::text::Text;
-
-/// Way of a joint [rad, m of a prismatic one] by which an arm that stands may differ from itself: less than the free space
-/// about a planned way at a reach of 2 m.
-const STANDS: f64 = 5e-3;
 
 impl App {
     /// From the board in view to the goal. Captures that there are count; without any the first is taken here.
@@ -62,6 +57,7 @@ impl App {
             planned.truncate(visited);
         }
         self.model.sequence_runs = true;
+        self.model.let_go = false;
         self.guided_step();
         true
     }
@@ -177,63 +173,68 @@ impl App {
         self.keep_guided();
     }
 
-    /// To the pose that is next, or waits for the person who lets the arm move.
+    /// To the pose that is next.
     fn guided_sets_out(&mut self) {
-        if self.model.confirms_moves() {
-            if let Some(guided) = self.guided_mut() {
-                guided.waits = Waits::Confirmation;
-            }
-        } else {
-            self.guided_goes();
+        if self.guided_is_elsewhere() {
+            return;
         }
-    }
-
-    /// To the pose that is next, or to another one where the arm is not where the way to that was checked from.
-    fn guided_goes(&mut self) {
-        let now = self.model.robot.as_ref().map(|robot| robot.joints_rad);
-        let Some(guided) = self.guided_mut() else { return };
-        if has_moved(guided.chosen_at.as_ref(), now.as_ref()) {
-            guided.waits = Waits::Answer;
-            let said = text!(
-                "The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now"
-            );
-            return self.say(Severity::Info, said);
-        }
-        guided.waits = Waits::Nothing;
-        if let Some(next) = guided.ahead.first().cloned() {
+        if let Some(next) = self.guided_mut().and_then(|guided| guided.ahead.first().cloned()) {
             self.guided_goes_to(&next);
         }
     }
 
-    /// Whether every move waits for a person. One that waits now begins where that is no longer wanted.
-    pub(crate) fn set_confirm_moves(&mut self, confirm: bool) {
-        self.model.view.confirm_moves = Some(confirm);
-        if !confirm {
-            self.confirm_move();
+    /// Whether the arm is not where the way to the next pose was checked from; then another one is chosen.
+    fn guided_is_elsewhere(&mut self) -> bool {
+        let now = self.model.robot.as_ref().map(|robot| robot.joints_rad);
+        // To the place where it begins there is no way.
+        let Some(guided) = self.guided_mut().filter(|guided| !guided.ahead.is_empty()) else { return false };
+        if !has_moved(guided.chosen_at.as_ref(), now.as_ref()) {
+            return false;
+        }
+        guided.waits = Waits::Answer;
+        let said =
+            text!("The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now");
+        self.say(Severity::Info, said);
+        true
+    }
+
+    /// The same for a pose that a person has just let the arm go to.
+    pub(crate) fn guided_chooses_anew(&mut self) -> bool {
+        let is_elsewhere = self.guided_is_elsewhere();
+        if is_elsewhere {
+            self.guided_leaves_out();
+        }
+        is_elsewhere
+    }
+
+    /// The last pose of the sequence is none of it after all.
+    fn guided_leaves_out(&mut self) {
+        let Some(sequence) = self.model.sequence.as_mut() else { return };
+        sequence.names.pop();
+        if let Some(planned) = &mut sequence.planned {
+            planned.pop();
         }
     }
 
-    /// A person lets the arm move to the pose that is next.
-    pub(crate) fn confirm_move(&mut self) {
-        if self.guided_mut().is_some_and(|guided| guided.waits == Waits::Confirmation) {
-            self.guided_goes();
+    /// A person leaves out the pose that is next; whether it was one of a guided sequence.
+    pub(crate) fn guided_skips(&mut self) -> bool {
+        if self.guided_mut().is_none() {
+            return false;
         }
-    }
-
-    /// A person leaves out the pose that is next.
-    pub(crate) fn skip_move(&mut self) {
-        let Some(guided) = self.guided_mut().filter(|guided| guided.waits == Waits::Confirmation) else { return };
+        self.guided_leaves_out();
+        let Some(guided) = self.guided_mut() else { return true };
         guided.ahead.clear();
         guided.waits = Waits::Answer;
         if guided.ending.is_some() {
             guided.tried += 1;
             if self.guided_is_over() {
-                return;
+                return true;
             }
         } else {
             guided.guide.skipped();
         }
         self.guided_step();
+        true
     }
 
     /// Has what was proposed and what came of it written beside the captures. The next one has it all again, so that one
@@ -319,18 +320,11 @@ impl App {
             guided.is_over = true;
         }
         self.model.sequence_runs = false;
+        self.model.asked = None;
         match severity {
             Severity::Info => self.say(severity, why),
             _ => self.say_in(Pane::Poses, severity, why),
         }
-    }
-}
-
-/// Whether the arm was moved between two moments; one that says nothing was.
-fn has_moved(from: Option<&JointValues>, to: Option<&JointValues>) -> bool {
-    match (from, to) {
-        (Some(from), Some(to)) => from.len() != to.len() || travel(from, to) > STANDS,
-        _ => true,
     }
 }
 

@@ -19,9 +19,11 @@ use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::project::session::{CaptureId, Document};
+use handeye_core::project::taught_poses::{TaughtJoint, TaughtOn, TaughtPose};
+use handeye_core::targets::TargetSpec;
 use handeye_core::verify::Predictor;
 use handeye_sim_link::cell::scene::SceneChoice;
-use handeye_sim_link::client::cell::CellPaths;
+use handeye_sim_link::client::cell::{ArmKinematics, CellPart, CellPaths};
 use serde::{Deserialize, Serialize};
 
 pub use crate::by_hand::state::ByHand;
@@ -36,8 +38,8 @@ pub use crate::live::state::{
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{
-    ArmDoubt, Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal, MotionId,
-    MotionOutcome, MotionRequest, Moves, Truth,
+    ArmDoubt, AskedMove, Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal,
+    MotionId, MotionOutcome, MotionRequest, Moves, Truth,
 };
 pub use crate::rerun_log::state::{RerunState, ViewerState};
 pub use crate::session::state::{
@@ -54,6 +56,8 @@ pub use handeye_sim_link::client::cell::BoardPath;
 pub use workflow::{Dialog, Pane, Step};
 
 use crate::keep_out::state::KeepOut;
+use crate::motion::rest::Stopping;
+use crate::motion::way::Way;
 use crate::session::start;
 use crate::text::{Language, Text};
 
@@ -308,6 +312,8 @@ pub struct Model {
     pub dropped_frames: u64,
     /// A stop was pressed and the robot has not confirmed it yet.
     pub stop_pending: bool,
+    /// The arm was told to stop, and its states have not said yet that it stands.
+    pub stopping: Option<Stopping>,
     /// The pixel under the pointer, in both images.
     pub cursor: Option<ImagePoint>,
     /// What is remembered from one start to the next.
@@ -334,6 +340,14 @@ pub struct Model {
     pub sequence: Option<PoseSequence>,
     /// Whether that sequence is still under way.
     pub sequence_runs: bool,
+    /// Whether a person has let the arm go since that sequence began or went on.
+    pub let_go: bool,
+    /// The move that waits until a person lets the arm go.
+    pub asked: Option<AskedMove>,
+    /// Where the arm stood when the cell was connected.
+    pub home: Option<JointValues>,
+    /// Counts the cells that were connected to.
+    pub cells: u64,
     /// The poses of a sequence are being planned.
     pub planning: bool,
     /// A person is guided from view to view.
@@ -417,6 +431,7 @@ impl Model {
             frame: None,
             dropped_frames: 0,
             stop_pending: false,
+            stopping: None,
             cursor: None,
             view,
             messages: Messages::default(),
@@ -430,6 +445,10 @@ impl Model {
             refused: None,
             sequence: None,
             sequence_runs: false,
+            let_go: false,
+            asked: None,
+            home: None,
+            cells: 0,
             by_hand: None,
             import: None,
             planning: false,
@@ -512,16 +531,66 @@ impl Model {
         sequence.and_then(|sequence| sequence.guided.as_deref()).map_or(&[], |guided| &guided.ahead)
     }
 
-    /// Whether each move of the arm to a chosen pose waits to be confirmed: as the user wants it, or else wherever the cell is not
-    /// the built-in one, because behind an address there may be a real arm.
+    /// Whether there may be a real arm: anywhere but in the built-in cell, also behind an address.
+    pub fn may_be_real(&self) -> bool {
+        !self.source.is_built_in()
+    }
+
+    /// Whether each move of the arm to a chosen pose waits to be confirmed: as the user wants it, or else wherever there may be a
+    /// real arm.
     pub fn confirms_moves(&self) -> bool {
-        self.view.confirm_moves.unwrap_or(!self.source.is_built_in())
+        self.view.confirm_moves.unwrap_or(self.may_be_real())
+    }
+
+    /// Whether a move to the next pose of a sequence, or to a place that somebody chose by its name, waits until a person has seen
+    /// how far it is. Where there may be a real arm the first one always does.
+    pub fn asks_before(&self, goal: &MotionGoal) -> bool {
+        // An arm that is only read refuses with the reason, and one that is there does not move.
+        if !self.is_armed() || Way::to(goal, self).is_some_and(|way| way.is_none()) {
+            return false;
+        }
+        let sequence = self.sequence.as_ref().filter(|_| self.sequence_runs);
+        let is_first = sequence.is_none() || !self.let_go;
+        let each = match sequence {
+            Some(sequence) if sequence.planned.is_some() => self.confirms_moves(),
+            // A person has been at taught poses.
+            Some(_) => self.view.confirm_moves == Some(true),
+            None => false,
+        };
+        each || is_first && self.may_be_real()
+    }
+
+    /// The cell that poses are taught on now, before this target; `None` before it is connected.
+    pub fn taught_on(&self, target: TargetSpec) -> Option<TaughtOn> {
+        let cell = self.cell.as_ref()?;
+        let base = match &self.source {
+            CellSource::BuiltIn(scene) => format!("built-in cell, scene {}", scene_name(scene)),
+            CellSource::Address(address) => format!("{address}, {}", self.objects.get(CellPart::Tip)),
+            CellSource::Drivers(drivers) => drivers.to_string(),
+        };
+        let joints = cell.joints.iter().map(|joint| TaughtJoint { kind: joint.kind, range: joint.range });
+        // Behind a driver it is found while the arm moves, a little otherwise each time.
+        let arm = cell.arm.as_ref().filter(|_| cell.moves == Moves::Freely);
+        let at_zero = |arm: &ArmKinematics| arm.tip(&JointValues::zeros(cell.joints.len())).translation().into();
+        Some(TaughtOn { base, joints: joints.collect(), tip_at_zero_m: arm.map(at_zero), target })
+    }
+
+    /// The taught poses of this cell; none before it is connected.
+    pub fn taught(&self) -> Vec<&TaughtPose> {
+        let Some(cell) = self.taught_on(self.document().meta.target) else { return Vec::new() };
+        self.document().taught.iter().filter(|pose| pose.is_of(Some(&cell))).collect()
+    }
+
+    /// Whether the reference poses are meant for this cell: for CoppeliaSim's UR5 in front of its board.
+    pub fn has_reference_poses(&self) -> bool {
+        let cell = self.cell.as_ref().filter(|cell| cell.moves == Moves::Freely);
+        cell.and_then(|cell| cell.arm.as_ref()).is_some_and(ArmKinematics::is_ur5)
     }
 
     /// Share of its fastest speed at which the arm moves: as the user wants it, or else a quarter, and half in the built-in
     /// cell, because behind an address there may be a real arm.
     pub fn speed(&self) -> f64 {
-        let usual = if self.source.is_built_in() { 0.5 } else { 0.25 };
+        let usual = if self.may_be_real() { 0.25 } else { 0.5 };
         self.view.jog.speed.unwrap_or(usual)
     }
 
@@ -569,5 +638,13 @@ impl LinkState {
             CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },
             CellSource::Drivers(drivers) => Self::Searching { address: drivers.to_string(), attempt: 1, why: None },
         }
+    }
+}
+
+/// A scene by the name of its file or that it comes with.
+fn scene_name(scene: &SceneChoice) -> String {
+    match scene {
+        SceneChoice::Shipped(shipped) => shipped.name().to_owned(),
+        SceneChoice::File(file) => file.display().to_string(),
     }
 }

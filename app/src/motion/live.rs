@@ -66,21 +66,48 @@ impl LiveMotion {
         if let Some(why) = bad_speed(speed) {
             return Ok(MotionOutcome::Refused(why));
         }
-        if let Some(why) = self.obstacle(goal)? {
-            return Ok(MotionOutcome::Refused(why));
-        }
-        match goal {
-            MotionGoal::Joints(joints) => {
-                let limits = limits::of_joints(&limits::SEQUENCE, speed, self.arm.info().joint_kinds());
-                self.arm.move_to_joints(joints, &limits, cancel)?;
-                self.arm.settle(&SettleOptions::default(), cancel)?;
-            }
-            MotionGoal::Tip(pose) => {
+        let direct = match (goal, self.obstacle(goal)?) {
+            (_, Some(why)) => Err(why),
+            (MotionGoal::Joints(joints), None) => Self::unless_in_the_way(self.go_through(&[*joints], speed, cancel))?,
+            (MotionGoal::Tip(pose), None) => {
                 let limits = limits::of_tip(&limits::SEQUENCE, speed);
-                self.arm.move_to_pose(pose, &limits, &MotionTolerance::default(), cancel)?;
+                let moved = self.arm.move_to_pose(pose, &limits, &MotionTolerance::default(), cancel);
+                Self::unless_in_the_way(moved)?
             }
+        };
+        // Nothing has moved where something is in the way.
+        let Err(why) = direct else { return Ok(MotionOutcome::Arrived) };
+        match self.way_around(goal, cancel)? {
+            Some(way) => self.go_through(&way, speed, cancel).map(|()| MotionOutcome::Arrived),
+            None => Ok(MotionOutcome::Refused(why)),
         }
-        Ok(MotionOutcome::Arrived)
+    }
+
+    fn unless_in_the_way(moved: Result<(), LinkError>) -> Result<Result<(), Text>, LinkError> {
+        match moved {
+            Err(LinkError::InTheWay { contact }) => Ok(Err(contact_text(&contact))),
+            moved => moved.map(Ok),
+        }
+    }
+
+    /// From configuration to configuration, straight in joint space.
+    fn go_through(&mut self, way: &[JointValues], speed: f64, cancel: &CancelToken) -> Result<(), LinkError> {
+        let limits = limits::of_joints(&limits::SEQUENCE, speed, self.arm.info().joint_kinds());
+        for joints in way {
+            self.arm.move_to_joints(joints, &limits, cancel)?;
+        }
+        self.arm.settle(&SettleOptions::default(), cancel).map(|_settled| ())
+    }
+
+    /// A way to the goal where the direct one touches something; `None` where none is found.
+    fn way_around(&mut self, goal: &MotionGoal, cancel: &CancelToken) -> Result<Option<Vec<JointValues>>, LinkError> {
+        let start = self.arm.joint_values()?;
+        let Some(among) = &self.among else { return Ok(None) };
+        let guard = among.guard(&start);
+        Ok(match goal {
+            MotionGoal::Joints(joints) => guard.detour(&start, joints, VIEWS_SEED, cancel),
+            MotionGoal::Tip(pose) => guard.detour_to(&start, pose, VIEWS_SEED, cancel),
+        })
     }
 
     fn jog_by(

@@ -1,9 +1,12 @@
 //! Moving the arm: goals, jogging, and what refuses or ends a motion.
 
+pub(crate) mod ask;
 pub(crate) mod desk;
 pub(crate) mod jog_line;
 pub(crate) mod live;
 pub(crate) mod pane;
+pub(crate) mod rest;
 pub(crate) mod state;
 pub(crate) mod update;
+pub(crate) mod way;
 pub(crate) mod worker;

@@ -139,6 +139,15 @@ pub struct MotionRequest {
     pub speed: f64,
 }
 
+/// A move that waits until a person lets the arm go.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AskedMove {
+    /// Where to.
+    pub goal: MotionGoal,
+    /// In words.
+    pub what: Text,
+}
+
 /// How a motion ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum MotionOutcome {

@@ -12,6 +12,7 @@ use crate::text::Text;
 impl App {
     /// Moves the arm to a place that the words name.
     pub(crate) fn start_motion(&mut self, goal: MotionGoal, what: Text) {
+        self.model.asked = None;
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         let id = self.numbers.motion;
         let request = MotionRequest { id, goal, speed: self.model.speed() };
@@ -28,13 +29,16 @@ impl App {
     }
 
     pub(crate) fn go_to_capture(&mut self, id: CaptureId) {
+        if !self.may_set_out() {
+            return;
+        }
         let Some(capture) = self.model.document().capture(id) else { return };
         let joints = capture.joints_rad.as_deref().and_then(|joints| JointValues::try_from(joints).ok());
         let of_arm = self.model.cell.as_ref().map(|cell| cell.joints.len());
         // Joints bring the arm back exactly; a recorded session may have the pose alone, or be of another arm.
         let joints = joints.filter(|joints| of_arm.is_none_or(|count| count == joints.len()));
         let goal = joints.map_or(MotionGoal::Tip(capture.base_from_tip), MotionGoal::Joints);
-        self.start_motion(goal, text!("pose of capture {id}", id = id));
+        self.set_out(goal, text!("pose of capture {id}", id = id));
     }
 
     pub(crate) fn moved(&mut self, id: MotionId, outcome: MotionOutcome) {

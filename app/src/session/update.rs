@@ -7,6 +7,7 @@ use handeye_core::estimate::handeye::Mode;
 use handeye_core::project::dataset::CameraInput;
 use handeye_core::project::export::ExportNames;
 use handeye_core::project::session::{CaptureId, Edit, Role};
+use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
 
 use crate::app::App;
@@ -24,9 +25,11 @@ impl App {
         let mut meta = start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
         meta.arm = start::arm(cell.and_then(|cell| cell.arm.as_ref()));
         meta.joint_kinds = cell.and_then(|cell| start::joint_kinds(cell.joints.iter().map(|joint| joint.kind)));
-        // They are meant for one arm, and would send any other somewhere.
-        let is_other = cell.and_then(|cell| cell.arm.as_ref()).is_some_and(|arm| !arm.is_ur5());
-        Box::new(Beginning { meta, taught: if is_other { Vec::new() } else { reference_poses() } })
+        // They would send any other arm somewhere.
+        let poses = if self.model.has_reference_poses() { reference_poses() } else { Vec::new() };
+        let cell = self.model.taught_on(meta.target);
+        let taught = poses.into_iter().map(|pose| TaughtPose { cell: cell.clone(), ..pose }).collect();
+        Box::new(Beginning { meta, taught })
     }
 
     /// Says what a session begins with while there is none on the disk.
@@ -158,6 +161,7 @@ impl App {
             // Its poses are those of the other session.
             self.model.sequence = None;
             self.model.sequence_runs = false;
+            self.model.asked = None;
             self.model.by_hand = None;
         }
         if let Some(names) = &new.export_names

@@ -17,7 +17,7 @@ const VERIFYING: usize = 5;
 
 impl App {
     pub(crate) fn run_sequence(&mut self, purpose: Option<CapturePurpose>) {
-        let names: Vec<String> = self.model.document().taught.iter().map(|pose| pose.name.clone()).collect();
+        let names: Vec<String> = self.model.taught().iter().map(|pose| pose.name.clone()).collect();
         if names.is_empty() {
             self.say(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
             return;
@@ -37,6 +37,7 @@ impl App {
         self.model.by_hand = None;
         self.model.sequence = Some(sequence);
         self.model.sequence_runs = true;
+        self.model.let_go = false;
         self.next_stop();
     }
 
@@ -52,6 +53,7 @@ impl App {
         let left = self.model.sequence.as_ref().and_then(PoseSequence::current);
         if left.is_some() && !self.model.sequence_runs && !self.model.planning {
             self.model.sequence_runs = true;
+            self.model.let_go = false;
             self.next_stop();
         }
     }
@@ -130,7 +132,7 @@ impl App {
             let name = name.to_owned();
             let planned = sequence.planned.as_ref().and_then(|joints| joints.get(sequence.outcomes.len()));
             match planned.copied() {
-                Some(joints) => self.start_motion(MotionGoal::Joints(joints), text!("pose {name}", name = name)),
+                Some(joints) => self.set_out(MotionGoal::Joints(joints), text!("pose {name}", name = name)),
                 None => self.go_to_taught(&name),
             }
             return;
@@ -154,7 +156,7 @@ impl App {
         }
     }
 
-    fn end_stop(&mut self, outcome: StopOutcome) {
+    pub(crate) fn end_stop(&mut self, outcome: StopOutcome) {
         self.guided_visited(&outcome);
         if let Some(sequence) = &mut self.model.sequence {
             sequence.outcomes.push(outcome);
@@ -209,6 +211,7 @@ impl App {
     /// Ends a sequence before its end, and says why where that is known.
     pub(crate) fn break_off(&mut self, why: Option<Text>) {
         self.model.sequence_runs = false;
+        self.model.asked = None;
         let pane = self.model.sequence.as_ref().map_or(Pane::Taught, pane_of);
         let said = match why {
             Some(why) => text!("The sequence was broken off, and what was captured is kept: {why}", why = why),

@@ -25,12 +25,19 @@ pub fn reference_poses() -> Vec<TaughtPose> {
 }
 
 impl App {
+    /// These are the poses of this cell now; those of others stay.
     fn edit_taught(&mut self, change: TaughtChange, poses: Vec<TaughtPose>) {
-        self.edit(Edit::SetTaught { change, poses });
+        let Some(cell) = self.model.taught_on(self.model.document().meta.target) else {
+            return self.say(Severity::Warning, text!("Taught poses belong to an arm: connect it first"));
+        };
+        let mut all = self.model.document().taught.clone();
+        all.retain(|pose| !pose.is_of(Some(&cell)));
+        all.extend(poses.into_iter().map(|pose| TaughtPose { cell: Some(cell.clone()), ..pose }));
+        self.edit(Edit::SetTaught { change, poses: all });
     }
 
     fn taught(&self) -> Vec<TaughtPose> {
-        self.model.document().taught.clone()
+        self.model.taught().into_iter().cloned().collect()
     }
 
     /// Joints are remembered and not the tip, because they bring the arm back on the same way.
@@ -43,7 +50,7 @@ impl App {
         let mut poses = self.taught();
         let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
         let name = name.unwrap_or_else(|| free_name(&poses));
-        poses.push(TaughtPose { name: name.clone(), goal });
+        poses.push(TaughtPose::new(name.clone(), goal));
         self.edit_taught(TaughtChange::Add(name), poses);
     }
 
@@ -74,7 +81,35 @@ impl App {
     }
 
     pub(crate) fn teach_reference(&mut self) {
-        self.edit_taught(TaughtChange::Replace, reference_poses());
+        if self.model.has_reference_poses() {
+            self.edit_taught(TaughtChange::Replace, reference_poses());
+        }
+    }
+
+    /// A person says that arm, base and target are as they were where the poses were taught.
+    pub(crate) fn adopt_taught(&mut self) {
+        let Some(cell) = self.model.taught_on(self.model.document().meta.target) else { return };
+        let fits = |pose: &&TaughtPose| match &pose.goal {
+            Goal::Joints(joints) => joints.len() == cell.joints.len(),
+            Goal::Tip(_) => true,
+        };
+        let elsewhere = self.model.document().taught.iter().filter(|pose| !pose.is_of(Some(&cell)));
+        let (fit, others): (Vec<&TaughtPose>, Vec<&TaughtPose>) = elsewhere.partition(fits);
+        let (adopted, others) = (fit.into_iter().cloned().collect::<Vec<_>>(), others.len());
+        if others > 0 {
+            let said = text!("{n} {n|pose has|poses have} another number of joints than this arm", n = others);
+            self.say(Severity::Warning, said);
+        }
+        if adopted.is_empty() {
+            return;
+        }
+        let change = TaughtChange::Import(adopted.len() as u32);
+        let mut poses = self.taught();
+        let mut all = self.model.document().taught.clone();
+        all.retain(|pose| !adopted.contains(pose) && !pose.is_of(Some(&cell)));
+        add_under_free_names(&mut poses, adopted);
+        all.extend(poses.into_iter().map(|pose| TaughtPose { cell: Some(cell.clone()), ..pose }));
+        self.edit(Edit::SetTaught { change, poses: all });
     }
 
     pub(crate) fn import_taught(&mut self, file: PathBuf) {
@@ -85,15 +120,7 @@ impl App {
     pub(crate) fn poses_read(&mut self, read: Vec<TaughtPose>) {
         let count = read.len() as u32;
         let mut poses = self.taught();
-        for mut pose in read {
-            let base = pose.name.clone();
-            let mut copy = 2;
-            while poses.iter().any(|other| other.name == pose.name) {
-                pose.name = format!("{base} ({copy})");
-                copy += 1;
-            }
-            poses.push(pose);
-        }
+        add_under_free_names(&mut poses, read);
         self.edit_taught(TaughtChange::Import(count), poses);
     }
 
@@ -109,14 +136,20 @@ impl App {
         self.expect(text!("The poses were not written"), asked);
     }
 
+    pub(crate) fn visit_taught(&mut self, name: &str) {
+        if self.may_set_out() {
+            self.go_to_taught(name);
+        }
+    }
+
     pub(crate) fn go_to_taught(&mut self, name: &str) {
         let what = text!("pose {name}", name = name);
-        let goal = self.model.document().taught.iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
+        let goal = self.model.taught().into_iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
             Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
             Goal::Joints(joints) => JointValues::try_from(&joints[..]).ok().map(MotionGoal::Joints),
         });
         match goal {
-            Some(Some(goal)) => self.start_motion(goal, what),
+            Some(Some(goal)) => self.set_out(goal, what),
             Some(None) => {
                 let why = text!("no arm has as many joints as the pose");
                 self.moved(self.numbers.motion, MotionOutcome::Refused(why));
@@ -126,6 +159,19 @@ impl App {
                 self.moved(self.numbers.motion, MotionOutcome::Refused(why));
             }
         }
+    }
+}
+
+/// Adds poses, each under a name that no other has.
+fn add_under_free_names(poses: &mut Vec<TaughtPose>, others: Vec<TaughtPose>) {
+    for mut pose in others {
+        let base = pose.name.clone();
+        let mut copy = 2;
+        while poses.iter().any(|other| other.name == pose.name) {
+            pose.name = format!("{base} ({copy})");
+            copy += 1;
+        }
+        poses.push(pose);
     }
 }
 

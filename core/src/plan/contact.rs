@@ -94,6 +94,11 @@ impl<'a> Guard<'a> {
         Self { arm, around, allowed: Allowed::all(around, clearance_m) }
     }
 
+    /// The arm.
+    pub(super) fn arm(&self) -> &'a Arm {
+        self.arm
+    }
+
     /// What stands around.
     pub fn surroundings(&self) -> &Surroundings {
         self.around

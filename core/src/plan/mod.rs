@@ -5,6 +5,7 @@ mod capsule;
 mod carried;
 mod clearance;
 mod contact;
+mod detour;
 pub mod guided;
 pub mod links;
 mod pace;

@@ -33,10 +33,11 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use crate::geometry::arm::MAX_JOINTS;
+use crate::geometry::arm::{JointKind, MAX_JOINTS};
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
+use crate::targets::TargetSpec;
 
 /// What `format` says.
 pub const FORMAT: &str = "handeye-poses";
@@ -68,6 +69,79 @@ pub struct TaughtPose {
     pub name: String,
     /// Where it is.
     pub goal: Goal,
+    /// The cell that it was taught on; `None` where nobody knows, as in sessions of versions that did not record it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cell: Option<TaughtOn>,
+}
+
+impl TaughtPose {
+    /// One of which the cell is not known.
+    pub fn new(name: impl Into<String>, goal: Goal) -> Self {
+        Self { name: name.into(), goal, cell: None }
+    }
+
+    /// Whether its goal is another number of joint values.
+    pub(super) fn joints_differ(&self, count: usize) -> bool {
+        matches!(&self.goal, Goal::Joints(joints) if joints.len() != count)
+    }
+
+    /// Whether it was taught on this cell.
+    pub fn is_of(&self, cell: Option<&TaughtOn>) -> bool {
+        match (&self.cell, cell) {
+            (Some(taught_on), Some(cell)) => taught_on.is_same(cell),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+/// The cell that poses were taught on. They lead another arm, or the same one elsewhere, to where nobody looked, and show a camera
+/// another target from there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TaughtOn {
+    /// Where the arm is found, and with it the base: a scene, an address or a driver.
+    pub base: String,
+    /// The joints from the base up.
+    pub joints: Vec<TaughtJoint>,
+    /// Where the tip is while all joints are at 0, metres; `None` where the chain of joints is not known beforehand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip_at_zero_m: Option<[f64; 3]>,
+    /// What is looked at.
+    pub target: TargetSpec,
+}
+
+/// A joint of the arm that poses were taught on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TaughtJoint {
+    /// How it moves.
+    pub kind: JointKind,
+    /// How far, radians or metres; `None` without end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<[f64; 2]>,
+}
+
+/// Ends of a joint that differ by less are the same \[rad, m\], and tips \[m\]: a simulator computes them anew for every connection.
+const SAME_RANGE: f64 = 1e-6;
+const SAME_TIP_M: f64 = 1e-3;
+
+impl TaughtOn {
+    /// Whether both are the same cell: the same arm at the same base before the same target.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let near = |a: &[f64], b: &[f64], most: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most);
+        let both = |a: Option<&[f64]>, b: Option<&[f64]>, most: f64| match (a, b) {
+            (Some(a), Some(b)) => near(a, b, most),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        let is_same_joint = |(a, b): (&TaughtJoint, &TaughtJoint)| {
+            a.kind == b.kind && both(a.range.as_ref().map(|it| &it[..]), b.range.as_ref().map(|it| &it[..]), SAME_RANGE)
+        };
+        let tip = |it: &Self| it.tip_at_zero_m;
+        self.base == other.base
+            && self.target == other.target
+            && self.joints.len() == other.joints.len()
+            && self.joints.iter().zip(&other.joints).all(is_same_joint)
+            && both(tip(self).as_ref().map(|it| &it[..]), tip(other).as_ref().map(|it| &it[..]), SAME_TIP_M)
+    }
 }
 
 /// Where a taught pose is.
@@ -365,7 +439,7 @@ fn parse(text: &str) -> Result<TaughtPoses, Defect> {
             goal(pose.get_ref(), &mut joints)
         };
         let goal = goal.map_err(|problem| Defect { pose: Some(name.clone()), ..at(pose.span(), problem) })?;
-        poses.push(TaughtPose { name, goal });
+        poses.push(TaughtPose::new(name, goal));
     }
     Ok(TaughtPoses { prismatic: joints.prismatic, start_joints_rad, limits, poses })
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::targets::Grid;
 
 const SEED10: &str = include_str!("../../../assets/poses/seed10.toml");
 
@@ -132,10 +133,8 @@ fn seed10_holds_the_reference_poses_exactly() {
 fn what_is_written_reads_back() {
     let mut poses = seed10();
     // Degrees and back to radians may move the last bit once; from then on nothing moves.
-    poses.poses.push(TaughtPose {
-        name: "by \"joints\" — é\n".into(),
-        goal: Goal::Joints(vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
-    });
+    let joints = Goal::Joints(vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+    poses.poses.push(TaughtPose::new("by \"joints\" — é\n", joints));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("taught.toml");
     poses.write(&path).expect("write");
@@ -154,7 +153,7 @@ fn what_is_written_reads_back() {
 fn a_prismatic_joint_has_metres_in_file_and_program() {
     // Angles that degrees have exactly.
     let goal = vec![0.0, -0.25, std::f64::consts::FRAC_PI_2];
-    let poses = vec![TaughtPose { name: "on the rail".into(), goal: Goal::Joints(goal.clone()) }];
+    let poses = vec![TaughtPose::new("on the rail", Goal::Joints(goal.clone()))];
     let taught = TaughtPoses { prismatic: vec![1], start_joints_rad: Some(goal), limits: None, poses };
     let text = taught.to_toml();
     assert!(text.contains("prismatic_joints = [2]") && text.contains(", -0.25, 90.0]"), "{text}");
@@ -194,4 +193,33 @@ fn a_defect_is_one_line_with_the_file_the_row_and_the_pose() {
     let error = TaughtPoses::parse(Path::new("p.toml"), head).expect_err("no poses").to_string();
     assert!(error.contains("no [[pose]]"), "{error}");
     assert!(TaughtPoses::read(Path::new("/nowhere/p.toml")).expect_err("no file").is_bad_input());
+}
+
+#[test]
+fn another_arm_base_or_target_is_another_cell() {
+    let joint = TaughtJoint { kind: JointKind::Revolute, range: Some([-3.0, 3.0]) };
+    let target = |square_m| TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m });
+    let cell = TaughtOn {
+        base: "tcp://127.0.0.1:23000".into(),
+        joints: vec![joint; 6],
+        tip_at_zero_m: Some([0.8, 0.2, 0.0]),
+        target: target(0.015),
+    };
+    // As computed anew for another connection.
+    let again = TaughtOn { tip_at_zero_m: Some([0.8 + 1e-9, 0.2, 0.0]), ..cell.clone() };
+    assert!(cell.is_same(&again));
+    let others = [
+        TaughtOn { base: "tcp://10.0.0.2:23000".into(), ..cell.clone() },
+        TaughtOn { joints: vec![joint; 7], ..cell.clone() },
+        TaughtOn { joints: vec![TaughtJoint { range: Some([-2.0, 3.0]), ..joint }; 6], ..cell.clone() },
+        TaughtOn { tip_at_zero_m: Some([1.2, 0.2, 0.0]), ..cell.clone() },
+        TaughtOn { target: target(0.02), ..cell.clone() },
+    ];
+    let pose = TaughtPose { cell: Some(cell.clone()), ..TaughtPose::new("a", Goal::Joints(vec![0.0; 6])) };
+    assert!(pose.is_of(Some(&again)) && !pose.is_of(None));
+    for other in others {
+        assert!(!pose.is_of(Some(&other)), "{other:?}");
+    }
+    let unknown = TaughtPose::new("a", Goal::Joints(vec![0.0; 6]));
+    assert!(!unknown.is_of(Some(&cell)), "nobody knows where it was taught");
 }

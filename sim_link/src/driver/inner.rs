@@ -20,6 +20,10 @@ use super::wire::WireProblem;
 /// Unknown types of messages that are named in the log.
 const MOST_UNKNOWN: usize = 32;
 
+/// A stamp of a state or an image is not later than that of the next pong by more than this \[s\]: what a clock may be set by, and what
+/// threads of a driver may lie apart.
+const MOST_AHEAD_S: f64 = 1.0;
+
 /// How far a request is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Progress {
@@ -113,6 +117,8 @@ pub struct Inner {
     /// When the last pong came, or the hello.
     pub last_heard_s: f64,
     pub states: States,
+    /// The stamp of the newest image.
+    pub newest_image: Option<f64>,
     pub frame: Option<FrameRequest>,
     pub requests: BTreeMap<u64, Progress>,
     pub last_id: u64,
@@ -205,6 +211,16 @@ impl Inner {
         let Some(position) = sent else {
             return Err(misplaced(format!("id {} is of no ping that waits for an answer", pong.id)));
         };
+        let newest = [self.states.newest().map(|reading| reading.stamp_s), self.newest_image];
+        for (kind, stamp) in ["state", "image"].into_iter().zip(newest) {
+            // What came before the pong was stamped before it.
+            if let Some(ahead_s) = stamp.map(|stamp| stamp - pong.stamp).filter(|ahead_s| *ahead_s > MOST_AHEAD_S) {
+                return Err(misplaced(format!(
+                    "the newest {kind} is stamped {ahead_s:.1} s later than this pong, which came after it: all stamps of a driver are \
+                     of one clock"
+                )));
+            }
+        }
         let (_, left_s) = self.pings[position];
         self.pings.remove(position);
         self.clock.add(left_s, arrived_s, pong.stamp);
@@ -237,6 +253,7 @@ impl Inner {
         if frame.after.is_some_and(|after| image.stamp <= after) {
             return Err(misplaced(format!("stamp {} is not after {}", image.stamp, frame.after.unwrap_or_default())));
         }
+        self.newest_image = Some(image.stamp);
         frame.image = Some((image, bytes));
         Ok(())
     }

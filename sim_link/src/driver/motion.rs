@@ -1,12 +1,13 @@
 //! Motions of one driver: allowed, begun, and ended.
 
-use handeye_core::geometry::arm::JointValues;
+use handeye_core::geometry::arm::{DISTANCE_LIMIT_M, JointValues, ROTATION_LIMIT_RAD};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
 use super::client::Driver;
 use super::error::{DriverError, Ending};
 use super::message::{Ability, PoseMessage, ToDriver};
+use super::rest::{Moved, Place, RestWatch};
 use super::shared::{Inner, Progress};
 
 /// Where the arm is to go.
@@ -18,11 +19,16 @@ pub enum Goal {
     Tip(Pose<Base, Tip>),
 }
 
-/// How a motion ended. The arm is at rest.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// How a motion ended.
+#[derive(Debug, Clone, PartialEq)]
 pub enum MoveEnd {
     /// It is there.
     Arrived,
+    /// The driver says that it is there, and its states say that it moves, or is elsewhere: from where it was, or was to be, to where
+    /// it is.
+    NotThere(Moved),
+    /// The driver says that it is there, and sends no states that would show it.
+    Unseen,
     /// It was stopped on its way, and why.
     Stopped(String),
     /// It was not begun, and why.
@@ -120,8 +126,24 @@ impl Driver {
         Ok(match ended {
             Progress::Refused(why) => MoveEnd::Refused(why),
             Progress::Stopped(why) => MoveEnd::Stopped(why),
-            _ => MoveEnd::Arrived,
+            _ => self.seen_at(goal)?,
         })
+    }
+
+    /// What the states say of a motion that is done.
+    fn seen_at(&self, goal: &Goal) -> Result<MoveEnd, DriverError> {
+        let shared = self.shared();
+        let (mut watch, mut last_s) = (RestWatch::default(), None);
+        let stood = shared.wait(shared.options.answer, None, |inner| {
+            let reading = inner.states.newest().filter(|reading| last_s != Some(reading.stamp_s))?;
+            last_s = Some(reading.stamp_s);
+            watch.take(reading.place()).then_some(())
+        })?;
+        let Some(newest) = watch.newest().filter(|_| watch.stands().is_some()) else { return Ok(MoveEnd::Unseen) };
+        if stood.is_none() {
+            return Ok(watch.moved().map_or(MoveEnd::Unseen, MoveEnd::NotThere));
+        }
+        Ok(elsewhere(goal, newest).map_or(MoveEnd::Arrived, MoveEnd::NotThere))
     }
 
     /// Brings the arm to rest and waits until it is. A driver that does not answer in time loses its connection, which it
@@ -142,6 +164,24 @@ impl Driver {
     }
 }
 
+/// From the goal to where the arm stands, where that is another place.
+fn elsewhere(goal: &Goal, place: &Place) -> Option<Moved> {
+    match (goal, &place.joints) {
+        (Goal::Joints(goal), Some(joints)) if goal.len() == joints.len() => {
+            let index =
+                (0..goal.len()).max_by(|&i, &j| (goal[i] - joints[i]).abs().total_cmp(&(goal[j] - joints[j]).abs()))?;
+            let off = (goal[index] - joints[index]).abs();
+            (off > ROTATION_LIMIT_RAD).then_some(Moved::Joint { index, from: goal[index], to: joints[index] })
+        }
+        (Goal::Joints(_), _) => None,
+        (Goal::Tip(goal), _) => {
+            let (distance_m, angle_rad) = goal.distance_to(&place.base_from_tip);
+            let is_near = distance_m <= DISTANCE_LIMIT_M && angle_rad <= ROTATION_LIMIT_RAD;
+            (!is_near).then_some(Moved::Tip { distance_m, angle_rad })
+        }
+    }
+}
+
 /// The request for a motion.
 pub(super) fn move_message(id: u64, goal: &Goal, speed: f64) -> ToDriver {
     let (joints_rad, base_from_tip) = match goal {
@@ -150,3 +190,8 @@ pub(super) fn move_message(id: u64, goal: &Goal, speed: f64) -> ToDriver {
     };
     ToDriver::Move { id, joints_rad, base_from_tip, speed }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[path = "motion_tests.rs"]
+mod tests;

@@ -19,13 +19,10 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Vector3};
 
 use super::message::{ArmMessage, Hello, StateMessage};
+use super::rest::RestWatch;
 use super::states::Reading;
 use crate::client::cell::ArmKinematics;
 
-/// For how long joints have not moved at an arm that stands \[s\], and by how much at the most [rad, m]: an encoder's noise.
-/// A controller measures pose and joints of one state at instants that differ by less.
-const REST_S: f64 = 0.2;
-const REST: f64 = 5e-4;
 /// Places are told apart by a turn of so much \[rad\]: a degree that joints and poses may differ by is a small part of it.
 const APART_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Sine of the angle between two axes that count as two.
@@ -75,8 +72,7 @@ pub struct ChainWatch {
     /// Where the driver says that the chain stands.
     base_from_arm: Isometry3<f64>,
     stands: Vec<Stand>,
-    /// Since when the joints are where they are.
-    since: Option<(f64, JointValues)>,
+    rest: RestWatch,
     placement: ChainPlacement,
 }
 
@@ -124,7 +120,7 @@ impl ChainWatch {
     /// Takes in a state, which was read as this.
     pub fn take(&mut self, state: &StateMessage, reading: &Reading) {
         let Some(joints) = &reading.joints else { return };
-        if !self.stood(reading, joints) {
+        if !self.stood(reading) {
             return;
         }
         let Some(chain) = &self.chain else { return };
@@ -161,14 +157,11 @@ impl ChainWatch {
     }
 
     /// Whether the arm stands in this state.
-    fn stood(&mut self, reading: &Reading, joints: &JointValues) -> bool {
-        let has_moved = |(_, before): &(f64, JointValues)| {
-            before.len() != joints.len() || before.iter().zip(joints).any(|(a, b)| (a - b).abs() > REST)
-        };
-        if reading.moving == Some(true) || self.since.as_ref().is_none_or(has_moved) {
-            self.since = Some((reading.stamp_s, *joints));
+    fn stood(&mut self, reading: &Reading) -> bool {
+        if reading.moving == Some(true) {
+            self.rest.restart();
         }
-        self.since.is_some_and(|(since_s, _)| reading.stamp_s - since_s >= REST_S)
+        self.rest.take(reading.place())
     }
 
     /// A place more, where it is another one; and what all of them say.

@@ -8,11 +8,20 @@ use handeye_core::geometry::se3;
 
 use super::limits::STATES_APART_S;
 use super::message::{BadMessage, PoseMessage, StateMessage};
+use super::rest::Place;
 
 /// For how long states are kept \[s\]: longer than an image takes from its exposure to here.
 const MEMORY_S: f64 = 10.0;
 /// Most states that are kept: those of 8 s at the highest rate of the protocol.
 const MOST: usize = 4096;
+
+/// No joint is farther from its zero than this [rad, m], and no tip from its base \[m\]: what says so is broken.
+const FARTHEST_JOINT: f64 = 1e3;
+const FARTHEST_TIP_M: f64 = 100.0;
+/// A tip is nowhere else at once by more than this \[m\]: to the other side of the largest arms, as when a simulator is reset, or by the
+/// length of a tool that is set. From there on it is not faster than twice the fastest arms \[m/s\].
+const MOST_JUMP_M: f64 = 5.0;
+const FASTEST_TIP_M_S: f64 = 20.0;
 
 /// The robot as a state says it, on the driver's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,8 +88,8 @@ impl Reading {
     /// Reads a state: `base_from_tip`, or the flange with its tool, or the joints of a chain that is known.
     ///
     /// # Errors
-    /// [`BadMessage`] for a pose that is none, a number of joints other than `joints`, and where nothing says where the
-    /// tip is.
+    /// [`BadMessage`] for a pose that is none, a number of joints other than `joints`, places where no arm is, and where nothing
+    /// says where the tip is.
     pub fn of(state: &StateMessage, joints: usize, arm: Option<&Arm>) -> Result<Self, BadMessage> {
         if let Some(values) = &state.joints_rad
             && values.len() != joints
@@ -107,7 +116,23 @@ impl Reading {
                 ));
             }
         };
+        if let Some((i, value)) =
+            state.joints_rad.iter().flatten().enumerate().find(|(_, value)| value.abs() > FARTHEST_JOINT)
+        {
+            let why = format!("joint {} at {value:.3e} (rad or m): no joint of an arm is there", i + 1);
+            return Err(BadMessage::value("joints_rad", why));
+        }
+        let away_m = base_from_tip.translation().norm();
+        if away_m > FARTHEST_TIP_M {
+            let why = format!("the tip is {away_m:.3e} m from the base: no arm reaches there; translations are metres");
+            return Err(BadMessage::value("base_from_tip", why));
+        }
         Ok(Self { stamp_s: state.stamp, base_from_tip, joints: state.joints_rad, moving: state.moving })
+    }
+
+    /// Where the arm is, for a [`RestWatch`](super::RestWatch).
+    pub fn place(&self) -> Place {
+        Place { stamp_s: self.stamp_s, joints: self.joints, base_from_tip: self.base_from_tip }
     }
 
     fn between(&self, next: &Self, stamp_s: f64) -> RobotAt {
@@ -144,13 +169,21 @@ impl States {
     /// Adds the newest.
     ///
     /// # Errors
-    /// [`BadMessage::Value`] for a stamp before that of the one before it.
+    /// [`BadMessage::Value`] for a stamp before that of the one before it, and for a tip that jumps.
     pub fn add(&mut self, reading: Reading) -> Result<(), BadMessage> {
         if let Some(last) = self.readings.back()
             && reading.stamp_s < last.stamp_s
         {
             let why = format!("{} after {}: stamps never go back", reading.stamp_s, last.stamp_s);
             return Err(BadMessage::value("stamp", why));
+        }
+        if let Some(last) = self.readings.back() {
+            let (jump_m, _) = last.base_from_tip.distance_to(&reading.base_from_tip);
+            let gap_s = reading.stamp_s - last.stamp_s;
+            if jump_m > MOST_JUMP_M + FASTEST_TIP_M_S * gap_s {
+                let why = format!("the tip is {jump_m:.1} m from where it was {gap_s:.3} s before: no arm is so fast");
+                return Err(BadMessage::value("base_from_tip", why));
+            }
         }
         while self.readings.len() >= MOST
             || self.readings.front().is_some_and(|first| reading.stamp_s - first.stamp_s > MEMORY_S)

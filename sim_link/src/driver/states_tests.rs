@@ -100,3 +100,27 @@ fn the_tip_is_found_from_the_flange_and_its_tool_or_from_the_joints_of_a_known_c
     assert!(Reading::of(&state, 7, Some(&arm)).is_err(), "hello has another number of joints");
     assert!(Reading::of(&empty, 6, Some(&arm)).is_err(), "hello has joints");
 }
+
+#[test]
+fn places_where_no_arm_is_and_tips_that_jump_are_named() {
+    let state = |joint: f64, x_m: f64| StateMessage {
+        stamp: 1.0,
+        joints_rad: Some([joint].into()),
+        base_from_flange: None,
+        flange_from_tcp: None,
+        base_from_tip: Some(PoseMessage::of(&Pose::<Base, Tip>::from_isometry(Isometry3::translation(x_m, 0.0, 0.0)))),
+        moving: None,
+    };
+    assert!(Reading::of(&state(3.0, 0.5), 1, None).is_ok());
+    let why = |joint, x_m| Reading::of(&state(joint, x_m), 1, None).unwrap_err().to_string();
+    assert!(why(1e308, 0.5).contains("joint 1 at 1.000e308"), "{}", why(1e308, 0.5));
+    assert!(why(0.1, 500.0).contains("5.000e2 m from the base"), "{}", why(0.1, 500.0));
+
+    let mut states = States::default();
+    states.add(reading(1.0, 0.4, 0.0)).unwrap();
+    // A simulator that was reset, and a gap in which the arm went.
+    states.add(reading(1.02, -2.0, 0.0)).unwrap();
+    let jump = states.add(reading(1.04, 8.0, 0.0)).unwrap_err().to_string();
+    assert!(jump.contains("10.0 m from where it was 0.020 s before"), "{jump}");
+    assert_eq!(states.newest().map(|reading| reading.stamp_s), Some(1.02), "nothing is driven by it");
+}

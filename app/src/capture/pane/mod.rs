@@ -19,6 +19,7 @@ use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
 use crate::live::textures::Thumbnails;
 use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, Moves, PoseSequence};
+use crate::motion::pane::asked_ui;
 use crate::scene::Standing;
 use crate::taught::pane::sequence;
 use crate::text::Language;
@@ -44,6 +45,12 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
             by_hand::pane::progress_ui(ui, model, hand, outbox);
         } else if let Some(sequence) = &model.sequence {
             progress_ui(ui, model, sequence, outbox);
+            if sequence.guided.is_none() && !sequence.is_planned() {
+                sequence::visits_ui(ui, model, sequence, outbox);
+            }
+        }
+        if !model.sequence_runs || !model.sequence.as_ref().is_some_and(|sequence| sequence.guided.is_some()) {
+            asked_ui(ui, model, outbox);
         }
     });
     let room = ui.available_rect_before_wrap();
@@ -129,7 +136,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     if let Some(sequence) = model.sequence.as_ref().filter(is_ours) {
         sequence::continue_ui(ui, model, sequence, outbox);
     }
-    let count = model.document().taught.len();
+    let count = model.taught().len();
     // With captures in the table the sequence is in the pane of the taught poses.
     if count == 0 || !model.document().captures.is_empty() || model.moves() == Moves::Never {
         return;

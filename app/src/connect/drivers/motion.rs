@@ -17,6 +17,7 @@ use super::port_error;
 use crate::limits;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 use crate::motion::live::{VIEWS_SEED, contact_text, no_views};
+use crate::motion::rest::moved_text;
 use crate::text;
 use crate::text::Text;
 use crate::worker::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
@@ -156,6 +157,14 @@ impl DriverMotion {
         }
         match self.robot().move_to(goal, speed, cancel) {
             Ok(MoveEnd::Arrived) => Ok(MotionOutcome::Arrived),
+            Ok(MoveEnd::NotThere(moved)) => Ok(MotionOutcome::Failed(text!(
+                "The driver says that the robot is there, and its states say otherwise: {moved}. Use its own stop, and look at the \
+                 driver",
+                moved = moved_text(&moved, |joint| self.robot().hello().joints.get(joint).map(|joint| joint.kind))
+            ))),
+            Ok(MoveEnd::Unseen) => Ok(MotionOutcome::Failed(text!(
+                "The driver says that the robot is there, and sends no states that show it"
+            ))),
             Ok(MoveEnd::Stopped(_)) if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
             // STOP comes over another connection.
             Ok(MoveEnd::Stopped(why)) if why.is_empty() => Ok(MotionOutcome::Stopped),

@@ -152,7 +152,7 @@ fn under_way(model: &Model) -> Option<Text> {
     }
     if let (true, Some(sequence)) = (model.sequence_runs, &model.sequence) {
         if let Some(guided) = &sequence.guided {
-            return Some(guided::pane::under_way(sequence, guided));
+            return Some(guided::pane::under_way(model, sequence, guided));
         }
         let (number, of) = (sequence.outcomes.len() + 1, sequence.names.len());
         return sequence.current().map(|name| text!("Pose {n} of {of}: {name}", n = number, of = of, name = name));

@@ -74,7 +74,7 @@ impl Silent {
         // The fake's line for motions refuses nobody; it has nothing to report once it is there.
         let settled = |app: &App| {
             let failed = |link| matches!(app.model().link(link), LinkState::Failed { .. });
-            let prepared = !app.model().document().taught.is_empty();
+            let prepared = !app.model().document().meta.created.is_empty();
             failed(Link::Control) && failed(Link::Camera) && app.model().mover.is_connected() && prepared
         };
         while !settled(&app) {

@@ -1,6 +1,7 @@
 //! Moves the arm by hand: along axes, joint by joint, or to numbers that are typed.
 
 mod allowance;
+mod asked;
 mod blocked;
 mod hold;
 mod joints;
@@ -16,6 +17,7 @@ use crate::connect::drivers::typed_pose::typed_pose_ui;
 use crate::gui::style::parts;
 use crate::model::{Model, Moves};
 use crate::tr;
+pub use asked::asked_ui;
 use blocked::Blocked;
 pub use blocked::unknown_arm;
 use hold::Hold;

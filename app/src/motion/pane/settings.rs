@@ -7,8 +7,8 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{self, Palette};
 use crate::model::{JogFrame, JogSettings, JogStep, Model, Moves};
-use crate::text::Language;
-use crate::{text, tr};
+use crate::text::{Language, Text};
+use crate::{limits, text, tr};
 
 /// Steps in millimetres, and in degrees for what turns: 50° at once would be a surprise.
 const STEPS: [(f64, f64); 5] = [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (10.0, 10.0), (50.0, 30.0)];
@@ -83,15 +83,32 @@ fn speed_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if response.changed() {
             outbox.send(Command::SetJog(JogSettings { speed: Some(percent / 100.0), ..settings }));
         }
-        let share = percent / 100.0;
-        let text = format!("{percent:.0} % · {:.0} mm/s", JOG_LINE_SPEED_M_S * 1e3 * share);
-        let more = text!(
-            "At the most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint",
-            line = format!("{:.0}", JOG_LINE_SPEED_M_S * 1e3 * share),
-            turn = format!("{:.1}", JOG_TURN_SPEED_RAD_S.to_degrees() * share),
-            joint = format!("{:.1}", JOG_JOINT_SPEED_RAD_S.to_degrees() * share)
-        );
+        let (said, more) = speed_said(model.moves(), percent / 100.0);
         let colour = Palette::of(ui).text;
-        ui.label(RichText::new(text).color(colour)).on_hover_text(more.say(language));
+        ui.label(RichText::new(said.say(language)).color(colour)).on_hover_text(more.say(language));
     });
+}
+
+/// The speed as far as it is known, and what that means. A controller behind a driver is given a share of its own highest speed, which
+/// nobody has said; a speed of the tip holds for jogging along a line alone.
+fn speed_said(moves: Moves, share: f64) -> (Text, Text) {
+    let percent = format!("{:.0}", share * 100.0);
+    if matches!(moves, Moves::OnceArmed { .. }) {
+        return (
+            text!("{percent} % of the robot's highest", percent = percent),
+            text!(
+                "The robot's controller plans the speed: how fast tip and joints go is not known here. Set limits on the controller"
+            ),
+        );
+    }
+    let line = format!("{:.0}", JOG_LINE_SPEED_M_S * 1e3 * share);
+    let more = text!(
+        "Jogging: at the most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint. Moves to a pose or to joint \
+         values: up to {pose}°/s for a joint, which takes the tip along faster",
+        line = &line,
+        turn = format!("{:.1}", JOG_TURN_SPEED_RAD_S.to_degrees() * share),
+        joint = format!("{:.1}", JOG_JOINT_SPEED_RAD_S.to_degrees() * share),
+        pose = format!("{:.0}", limits::SEQUENCE.joint_velocity.to_degrees() * share)
+    );
+    (text!("{percent} % · jog along a line {line} mm/s", percent = percent, line = line), more)
 }

@@ -10,8 +10,8 @@ use crate::command::Command;
 use crate::gui::testing::driven::Driven;
 use crate::gui::testing::sample;
 use crate::model::{
-    ArmDoubt, Axis, CellFacts, CellSource, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion, MotionGoal,
-    MotionId, Pane, Severity, Simulation,
+    ArmDoubt, Axis, CellFacts, CellSource, Drivers, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion,
+    MotionGoal, MotionId, Pane, Severity, Simulation,
 };
 use crate::text::Text;
 
@@ -145,13 +145,59 @@ fn frame_step_and_speed_are_chosen() {
     let sent = pane.click("Step 10 mm, 10°");
     let [Command::SetJog(jog)] = sent[..] else { panic!("{sent:?}") };
     assert_eq!(jog.step, JogStep::Step { metres: 0.01, radians: 10.0_f64.to_radians() });
-    assert!(pane.sees("50 % · 125 mm/s"), "no arm can be hurt in the built-in cell");
+    assert!(pane.sees("50 % · jog along a line 125 mm/s"), "no arm can be hurt in the built-in cell");
     pane.model().source = CellSource::Address("tcp://127.0.0.1:23000".to_owned());
     pane.steps();
-    assert!(pane.sees("25 % · 62 mm/s"), "there may be a real arm behind an address");
+    assert!(pane.sees("25 % · jog along a line 62 mm/s"), "there may be a real arm behind an address");
     pane.model().view.jog.speed = Some(0.8);
     pane.steps();
-    assert!(pane.sees("80 % · 200 mm/s"));
+    assert!(pane.sees("80 % · jog along a line 200 mm/s") && pane.nothing_is_cut_off());
+}
+
+#[test]
+fn behind_a_driver_the_speed_is_a_share_because_no_more_is_known() {
+    let mut model = sample::connected();
+    model.source = CellSource::Drivers(Drivers { robot: Some("robot".to_owned()), camera: None });
+    model.cell.as_mut().expect("connected").moves = Moves::OnceArmed { joints: true, tip: true };
+    let pane = driven(model);
+    assert!(pane.sees("25 % of the robot's highest") && !pane.sees("mm/s"));
+    assert!(pane.nothing_is_cut_off());
+}
+
+/// As after a session with another arm, or after the arm was moved by its pendant.
+#[test]
+fn numbers_follow_the_arm_until_a_person_edits_them_and_say_how_far_the_move_is() {
+    let mut pane = driven(sample::connected());
+    let turn = |pane: &mut Driven, joint_deg: f64| {
+        let robot = pane.model().robot.as_mut().expect("connected");
+        robot.joints_rad[0] = joint_deg.to_radians();
+        pane.steps();
+    };
+    let goal = |pane: &mut Driven| match &pane.click("Move there")[..] {
+        [Command::Move { goal: MotionGoal::Joints(joints), .. }] => joints[0].to_degrees(),
+        other => panic!("{other:?}"),
+    };
+    turn(&mut pane, 101.0);
+    assert!((goal(&mut pane) - 101.0).abs() < 1e-9, "nobody has typed anything else");
+    assert!(pane.sees("These are the numbers of where the arm is"));
+
+    pane.type_into("J1 of the goal", "-93");
+    pane.press(Key::Enter);
+    assert!(pane.sees("J1 goes farthest, by 194.0°"));
+    turn(&mut pane, 11.0);
+    assert!(pane.sees("J1 goes farthest, by 104.0°"), "what was typed stays, and the way is that from here");
+    assert!((goal(&mut pane) + 93.0).abs() < 1e-9);
+
+    pane.model().cells += 1;
+    pane.steps();
+    assert!((goal(&mut pane) - 11.0).abs() < 1e-9, "another cell has another arm");
+    pane.type_into("J1 of the goal", "-93");
+    pane.press(Key::Enter);
+    pane.model().robot = None;
+    pane.steps();
+    pane.model().robot = sample::connected().robot;
+    turn(&mut pane, 20.0);
+    assert!((goal(&mut pane) - 20.0).abs() < 1e-9, "it may have been anywhere meanwhile");
 }
 
 #[test]

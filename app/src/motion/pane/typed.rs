@@ -11,6 +11,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
 use crate::model::{Model, MotionGoal, RobotState};
+use crate::motion::way::Way;
 use crate::{text, tr};
 
 /// Width of a field.
@@ -26,13 +27,17 @@ struct Typed {
     joints: JointValues,
     /// x, y, z \[mm\]; roll, pitch, yaw [°].
     tip: [f64; 6],
-    /// Whether it was filled with where the arm is.
-    is_filled: bool,
+    /// Whether a person has typed any of it; until then the numbers are those of the arm.
+    is_edited: bool,
+    /// Whether the arm was sent there.
+    is_sent: bool,
+    /// The cell that it is for, see [`Model::cells`].
+    cell: u64,
 }
 
 impl Default for Typed {
     fn default() -> Self {
-        Self { is_tip: false, joints: JointValues::zeros(0), tip: [0.0; 6], is_filled: false }
+        Self { is_tip: false, joints: JointValues::zeros(0), tip: [0.0; 6], is_edited: false, is_sent: false, cell: 0 }
     }
 }
 
@@ -46,7 +51,27 @@ impl Typed {
         let mm = [x, y, z].map(|metres| rounded(metres * 1e3));
         let deg = [roll, pitch, yaw].map(|radians| rounded(radians.to_degrees()));
         self.tip = [mm[0], mm[1], mm[2], deg[0], deg[1], deg[2]];
-        self.is_filled = true;
+    }
+
+    /// Has the numbers follow the arm, unless somebody has typed others for this arm where it is read.
+    fn follow(&mut self, model: &Model) {
+        let robot = model.robot.as_ref();
+        self.is_edited &= self.cell == model.cells && robot.is_some_and(|it| it.joints_rad.len() == self.joints.len());
+        self.cell = model.cells;
+        // What was typed is done with once the arm is there.
+        self.is_edited &= !(self.is_sent && Way::to(&self.goal(model), model).is_some_and(|way| way.is_none()));
+        self.is_sent &= self.is_edited;
+        if let Some(robot) = robot.filter(|_| !self.is_edited) {
+            self.fill(model, robot);
+        }
+    }
+
+    fn goal(&self, model: &Model) -> MotionGoal {
+        if self.is_tip {
+            return MotionGoal::Tip(self.base_from_tip());
+        }
+        let si = |i: usize| self.joints[i] / model.joint_kind(i).shown_per_si();
+        MotionGoal::Joints(JointValues::from_fn(self.joints.len(), si))
     }
 
     fn base_from_tip(&self) -> Pose<Base, Tip> {
@@ -61,16 +86,13 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     let language = model.view.language;
     let id = Id::new("typed goal");
     let mut typed: Typed = parts::remembered(ui, id);
-    // Another arm has other joints.
-    let is_other = |robot: &RobotState| !typed.is_filled || robot.joints_rad.len() != typed.joints.len();
-    if let Some(robot) = model.robot.as_ref().filter(|robot| is_other(robot)) {
-        typed.fill(model, robot);
-    }
+    typed.follow(model);
     parts::section_ui(ui, tr!(language, "Move to numbers"));
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         for (is_tip, name) in [(false, tr!(language, "Joint values")), (true, tr!(language, "Tip pose in base"))] {
             if ui.selectable_label(typed.is_tip == is_tip, name).clicked() {
+                typed.is_edited &= typed.is_tip == is_tip;
                 typed.is_tip = is_tip;
             }
         }
@@ -79,22 +101,24 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     if typed.is_tip {
         parts::hint_ui(ui, tr!(language, "Rotation: R = Rz(yaw) · Ry(pitch) · Rx(roll), as in URDF"));
     }
+    let goal = typed.goal(model);
+    let way = Way::to(&goal, model);
+    let said = match way {
+        Some(_) if !typed.is_edited => text!("These are the numbers of where the arm is: type others"),
+        Some(way) => text!("To there {way}", way = way.said(model)),
+        None => text!("Not read yet"),
+    };
+    parts::hint_ui(ui, &said.say(language));
     ui.horizontal(|ui| {
         let reason = if typed.is_tip { blocked.tip } else { blocked.arm };
         if parts::gated_ui(ui, reason, Button::new(tr!(language, "Move there"))).clicked() {
-            let (goal, what) = if typed.is_tip {
-                (MotionGoal::Tip(typed.base_from_tip()), text!("typed tip pose"))
-            } else {
-                let si = |i: usize| typed.joints[i] / model.joint_kind(i).shown_per_si();
-                (MotionGoal::Joints(JointValues::from_fn(typed.joints.len(), si)), text!("typed joint values"))
-            };
+            let what = if typed.is_tip { text!("typed tip pose") } else { text!("typed joint values") };
             outbox.send(Command::Move { goal, what });
+            typed.is_sent = true;
         }
         let is_read = model.robot.is_some();
-        if ui.add_enabled(is_read, Button::new(tr!(language, "Take where it is"))).clicked()
-            && let Some(robot) = &model.robot
-        {
-            typed.fill(model, robot);
+        if ui.add_enabled(is_read, Button::new(tr!(language, "Take where it is"))).clicked() {
+            typed.is_edited = false;
         }
     });
     parts::remember(ui, id, typed);
@@ -105,6 +129,7 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
     let is_tip = typed.is_tip;
     let language = model.view.language;
     let tip = ["x", "y", "z", tr!(language, "roll"), tr!(language, "pitch"), tr!(language, "yaw")];
+    let mut edited = false;
     let values: &mut [f64] = if is_tip { &mut typed.tip } else { &mut typed.joints };
     Grid::new("typed goal").num_columns(6).spacing([6.0, 4.0]).min_col_width(0.0).show(ui, |ui| {
         for (index, value) in values.iter_mut().enumerate() {
@@ -131,6 +156,7 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
                 .max_decimals(2)
                 .suffix(unit);
             let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
+            edited |= response.changed();
             let said = text!("{name} of the goal", name = name).say(language);
             response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
             if index % 3 == 2 {
@@ -138,4 +164,5 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
             }
         }
     });
+    (typed.is_edited, typed.is_sent) = (typed.is_edited || edited, typed.is_sent && !edited);
 }

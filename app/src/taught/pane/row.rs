@@ -33,9 +33,9 @@ enum Mark {
 }
 
 /// The row.
-pub fn row_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbox: &mut Outbox) {
+pub fn row_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose: &TaughtPose, outbox: &mut Outbox) {
     let language = model.view.language;
-    let count = model.document().taught.len();
+    let count = poses.len();
     let mark = mark(model, &pose.name);
     let row = ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -66,13 +66,13 @@ pub fn row_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbo
                 outbox.send(Command::GoToTaught(name.clone()));
             }
             kind_ui(ui, pose, model);
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| name_ui(ui, model, index, pose, outbox));
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| name_ui(ui, model, poses, index, pose, outbox));
         });
     });
     if let Mark::Skipped(why) = &mark {
         parts::caption_ui(ui, &text!("Skipped: {why}", why = why.clone()).say(language));
     }
-    drop_ui(ui, model, index, row.response.rect, outbox);
+    drop_ui(ui, poses, index, row.response.rect, outbox);
 }
 
 fn mark(model: &Model, name: &str) -> Mark {
@@ -117,7 +117,7 @@ fn kind_ui(ui: &mut Ui, pose: &TaughtPose, model: &Model) {
 }
 
 /// The name, which is edited where it stands.
-fn name_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbox: &mut Outbox) {
+fn name_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose: &TaughtPose, outbox: &mut Outbox) {
     let language = model.view.language;
     let id = Id::new("renaming of a taught pose");
     let renaming: Option<Renaming> = parts::remembered(ui, id);
@@ -125,7 +125,7 @@ fn name_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbox: 
         Some(renaming) if renaming.from == pose.name => renaming.to.clone(),
         _ => pose.name.clone(),
     };
-    let taken = shown.trim() != pose.name && model.document().taught.iter().any(|other| other.name == shown.trim());
+    let taken = shown.trim() != pose.name && poses.iter().any(|other| other.name == shown.trim());
     let palette = Palette::of(ui);
     let field = TextEdit::singleline(&mut shown)
         .desired_width(ui.available_width())
@@ -153,7 +153,7 @@ fn name_ui(ui: &mut Ui, model: &Model, index: usize, pose: &TaughtPose, outbox: 
 }
 
 /// Where a row that is dragged would go, and going there.
-fn drop_ui(ui: &mut Ui, model: &Model, index: usize, row: Rect, outbox: &mut Outbox) {
+fn drop_ui(ui: &mut Ui, poses: &[&TaughtPose], index: usize, row: Rect, outbox: &mut Outbox) {
     let area = row.expand2(Vec2::new(0.0, ui.spacing().item_spacing.y / 2.0));
     let response = ui.interact(area, Id::new(("place of a taught pose", index)), Sense::hover());
     let Some(dragged) = response.dnd_hover_payload::<Dragged>() else { return };
@@ -166,7 +166,7 @@ fn drop_ui(ui: &mut Ui, model: &Model, index: usize, row: Rect, outbox: &mut Out
     let gap = index + usize::from(below);
     // Its own place is free once it is taken out.
     let to = if gap > dragged.0 { gap - 1 } else { gap };
-    if let Some(pose) = model.document().taught.get(dragged.0).filter(|_| to != dragged.0) {
+    if let Some(pose) = poses.get(dragged.0).filter(|_| to != dragged.0) {
         outbox.send(Command::ReorderTaught { name: pose.name.clone(), to });
     }
 }

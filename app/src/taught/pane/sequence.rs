@@ -6,6 +6,8 @@ use super::immovable;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::model::{CapturePurpose, Model, PoseSequence, StopOutcome};
+use crate::motion::pane::asked_ui;
+use crate::text::Text;
 use crate::{text, tr};
 
 /// Buttons that begin a sequence, or its progress.
@@ -13,6 +15,7 @@ pub fn sequence_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     match &model.sequence {
         Some(sequence) if model.sequence_runs => progress_ui(ui, model, sequence, outbox),
         sequence => {
+            asked_ui(ui, model, outbox);
             begin_ui(ui, model, outbox);
             if let Some(sequence) = sequence.as_ref().filter(|sequence| !sequence.is_planned()) {
                 summary_ui(ui, model, sequence, outbox);
@@ -23,7 +26,7 @@ pub fn sequence_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let is_empty = model.document().taught.is_empty();
+    let is_empty = model.taught().is_empty();
     let reason = immovable(model).or_else(|| is_empty.then(|| tr!(language, "Teach poses first")));
     parts::caption_ui(ui, tr!(language, "Run all poses"));
     ui.horizontal_wrapped(|ui| {
@@ -45,7 +48,59 @@ fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 outbox.send(Command::RunSequence { purpose });
             }
         }
+        home_ui(ui, model, outbox);
     });
+}
+
+/// The way back to where the arm was first, and of the built-in cell to how all of it was.
+pub fn home_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    if model.home.is_some() {
+        let button = Button::new(tr!(language, "Home"));
+        let what =
+            tr!(language, "Moves the arm to where it stood when the cell was connected, around what is in the way");
+        if parts::gated_ui(ui, immovable(model), button).on_hover_text(what).clicked() {
+            outbox.send(Command::GoHome);
+        }
+    }
+    if model.source.is_built_in() {
+        let button = Button::new(tr!(language, "Reset the cell"));
+        let what =
+            tr!(language, "Starts the built-in cell again: arm and board stand as at first; the session stays open");
+        let reason = model.sequence_runs.then(|| tr!(language, "A sequence is under way"));
+        if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
+            outbox.send(Command::ResetCell);
+        }
+    }
+}
+
+/// Which poses were left out, a line for each reason.
+pub fn skipped_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
+    let mut reasons: Vec<(&Text, Vec<&str>)> = Vec::new();
+    for (name, outcome) in sequence.names.iter().zip(&sequence.outcomes) {
+        let StopOutcome::Skipped(why) = outcome else { continue };
+        match reasons.iter_mut().find(|(said, _)| *said == why) {
+            Some((_, names)) => names.push(name),
+            None => reasons.push((why, vec![name])),
+        }
+    }
+    for (why, names) in reasons {
+        let said = text!("Skipped {names}: {why}", names = names.join(", "), why = why.clone());
+        parts::caption_ui(ui, &said.say(model.view.language));
+    }
+}
+
+/// In the pane of the captures: how a sequence of taught poses goes and, where poses were left out or it was broken off, how it went
+/// and what helps.
+pub fn visits_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
+    let is_whole = sequence.outcomes.len() == sequence.names.len()
+        && sequence.outcomes.iter().all(|outcome| *outcome == StopOutcome::Done);
+    if model.sequence_runs || is_whole {
+        return;
+    }
+    parts::hint_ui(ui, &went(sequence).say(model.view.language));
+    skipped_ui(ui, model, sequence);
+    ui.horizontal_wrapped(|ui| home_ui(ui, model, outbox));
 }
 
 /// How far it is, and the button that ends it.
@@ -60,22 +115,26 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop the sequence")) {
         outbox.send(Command::StopSequence);
     }
+    asked_ui(ui, model, outbox);
 }
 
 /// How the last one went, and the button that goes on with it where poses are left.
 pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
+    parts::hint_ui(ui, &went(sequence).say(model.view.language));
+    continue_ui(ui, model, sequence, outbox);
+}
+
+fn went(sequence: &PoseSequence) -> Text {
     let done = sequence.outcomes.iter().filter(|outcome| **outcome == StopOutcome::Done).count();
     let skipped = sequence.outcomes.len() - done;
     let left = sequence.names.len().saturating_sub(sequence.outcomes.len());
-    let said = text!(
+    text!(
         "Last sequence: {done} of {of} done, {skipped} skipped, {left} not visited",
         done = done,
         of = sequence.names.len(),
         skipped = skipped,
         left = left
-    );
-    parts::hint_ui(ui, &said.say(model.view.language));
-    continue_ui(ui, model, sequence, outbox);
+    )
 }
 
 /// The button that goes on with a sequence that was broken off.

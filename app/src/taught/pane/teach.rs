@@ -12,7 +12,7 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let id = Id::new("name of the pose to teach");
     let mut name: String = parts::remembered(ui, id);
-    let taken = model.document().taught.iter().any(|pose| pose.name == name.trim());
+    let taken = model.taught().iter().any(|pose| pose.name == name.trim());
     let reason = if model.robot.is_none() || !model.control.is_connected() {
         Some(tr!(language, "Not connected: nobody knows where the arm is"))
     } else if taken {
@@ -40,15 +40,24 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().button_padding.x = 7.0;
-        if ui.button(tr!(language, "Import…")).on_hover_text(tr!(language, "Add poses from a file")).clicked() {
+        let reason = model.cell.is_none().then(|| tr!(language, "Not connected: taught poses belong to an arm"));
+        let import = parts::gated_ui(ui, reason, Button::new(tr!(language, "Import…")));
+        if import.on_hover_text(tr!(language, "Add poses from a file")).clicked() {
             outbox.send(Command::SetDialog(Some(Dialog::ImportPoses)));
         }
-        let is_empty = model.document().taught.is_empty();
+        let is_empty = model.taught().is_empty();
         if ui.add_enabled(!is_empty, Button::new(tr!(language, "Export…"))).clicked() {
             outbox.send(Command::SetDialog(Some(Dialog::ExportPoses)));
         }
         let what = tr!(language, "Ten poses around the board, instead of those in the list. Undo brings them back");
-        let reason = model.sequence_runs.then(|| tr!(language, "A sequence is under way"));
+        let reason = if model.has_reference_poses() {
+            model.sequence_runs.then(|| tr!(language, "A sequence is under way"))
+        } else {
+            Some(tr!(
+                language,
+                "The reference poses are those of CoppeliaSim's UR5: another arm would go somewhere else"
+            ))
+        };
         let button = Button::new(tr!(language, "Reference poses"));
         if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
             outbox.send(Command::TeachReference);

@@ -18,10 +18,14 @@ fn model() -> Model {
     let document = Arc::make_mut(&mut model.session.document);
     let tip = Goal::Tip(Pose::from_translation_xyzw([0.3, 0.0, 0.4], [0.0, 0.0, 0.0, 1.0]));
     document.taught = vec![
-        TaughtPose { name: "front".to_owned(), goal: Goal::Joints(vec![0.0, 0.5, -1.0, 0.0, 1.5, 0.0]) },
-        TaughtPose { name: "left".to_owned(), goal: tip.clone() },
-        TaughtPose { name: "right".to_owned(), goal: tip },
+        TaughtPose::new("front", Goal::Joints(vec![0.0, 0.5, -1.0, 0.0, 1.5, 0.0])),
+        TaughtPose::new("left", tip.clone()),
+        TaughtPose::new("right", tip),
     ];
+    let cell = model.taught_on(model.document().meta.target);
+    for pose in &mut Arc::make_mut(&mut model.session.document).taught {
+        pose.cell.clone_from(&cell);
+    }
     model
 }
 

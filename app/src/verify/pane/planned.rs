@@ -6,11 +6,11 @@ use handeye_core::estimate::handeye::Mode;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
-use crate::model::{CapturePurpose, Model, Motion, Pane, PoseSequence, StopOutcome};
+use crate::model::{CapturePurpose, Model, Motion, Pane, PoseSequence};
 use crate::motion::pane::unknown_arm;
 use crate::taught::pane::immovable;
 use crate::taught::pane::sequence;
-use crate::{text, tr};
+use crate::tr;
 
 /// The button that begins, or how far it is; and how it went.
 pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -74,12 +74,6 @@ fn blocked(model: &Model) -> Option<&'static str> {
 }
 
 fn went_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
-    let language = model.view.language;
     sequence::summary_ui(ui, model, sequence, outbox);
-    for (name, outcome) in sequence.names.iter().zip(&sequence.outcomes) {
-        if let StopOutcome::Skipped(why) = outcome {
-            let said = text!("{name} was skipped: {why}", name = name, why = why.clone());
-            parts::caption_ui(ui, &said.say(language));
-        }
-    }
+    sequence::skipped_ui(ui, model, sequence);
 }

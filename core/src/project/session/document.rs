@@ -26,7 +26,7 @@ pub struct Document {
     pub meta: SessionMeta,
     /// The captures in the order in which they were taken; a deleted one is not among them.
     pub captures: Vec<CaptureRecord>,
-    /// The taught poses in the order in which they are visited. No two have the same name.
+    /// The taught poses of all cells in the order in which they are visited. No two of a cell have the same name.
     #[serde(default)]
     pub taught: Vec<TaughtPose>,
     /// The names that exports use for frames and cameras, as the exporter understands them.
@@ -252,21 +252,21 @@ impl CaptureRecord {
     }
 }
 
-/// What a file of taught poses asks for as well, so that the poses of every session can be written to one.
+/// What a file of taught poses asks for as well, so that the poses of every cell can be written to one.
 pub(super) fn check_taught(poses: &[TaughtPose]) -> Result<(), EditError> {
-    let mut joint_count = None;
     for (i, pose) in poses.iter().enumerate() {
+        let before = || poses[..i].iter().filter(|other| other.is_of(pose.cell.as_ref()));
         let refuse = |what: &str| Err(bad(format!("taught pose {:?}", pose.name), what));
         if pose.name.trim().is_empty() {
             return refuse("has an empty name");
         }
-        if poses[..i].iter().any(|other| other.name == pose.name) {
+        if before().any(|other| other.name == pose.name) {
             return Err(EditError::SamePoseName(pose.name.clone()));
         }
         match &pose.goal {
             Goal::Tip(base_from_tip) if !base_from_tip.is_finite() => return refuse("is not finite"),
             Goal::Joints(joints) if !joints.iter().all(|v| v.is_finite()) => return refuse("is not finite"),
-            Goal::Joints(joints) if joints.is_empty() || *joint_count.get_or_insert(joints.len()) != joints.len() => {
+            Goal::Joints(joints) if joints.is_empty() || before().any(|other| other.joints_differ(joints.len())) => {
                 return refuse("has another number of joint angles than the poses before, or none");
             }
             Goal::Tip(_) | Goal::Joints(_) => {}

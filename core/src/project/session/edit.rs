@@ -107,13 +107,14 @@ impl Document {
 impl TaughtChange {
     /// Whether the poses before and after show it.
     fn fits(&self, before: &[TaughtPose], after: &[TaughtPose]) -> bool {
-        let had = |name: &String| before.iter().any(|pose| pose.name == *name);
-        let has = |name: &String| after.iter().any(|pose| pose.name == *name);
+        // Poses of other cells may have the same name.
+        let count = |poses: &[TaughtPose], name: &String| poses.iter().filter(|pose| pose.name == *name).count();
+        let (had, has) = (|name: &String| count(before, name), |name: &String| count(after, name));
         match self {
-            Self::Add(name) => !had(name) && has(name),
-            Self::Remove(name) => had(name) && !has(name),
-            Self::Rename { from, to } => had(from) && !has(from) && !had(to) && has(to),
-            Self::Reorder(name) => had(name) && has(name),
+            Self::Add(name) => has(name) == had(name) + 1,
+            Self::Remove(name) => has(name) + 1 == had(name),
+            Self::Rename { from, to } => has(from) + 1 == had(from) && has(to) == had(to) + 1,
+            Self::Reorder(name) => had(name) > 0 && has(name) == had(name),
             Self::Import(_) | Self::Replace => true,
         }
     }

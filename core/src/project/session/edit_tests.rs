@@ -4,7 +4,7 @@ use super::*;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::Pose;
 use crate::project::session::tests::{meta, record};
-use crate::project::taught_poses::Goal;
+use crate::project::taught_poses::{Goal, TaughtOn};
 use crate::targets::Grid;
 
 fn document(captures: u32) -> Document {
@@ -21,7 +21,7 @@ fn left(document: &Document) -> Vec<u32> {
 }
 
 fn taught(names: &[&str]) -> Vec<TaughtPose> {
-    names.iter().map(|name| TaughtPose { name: (*name).into(), goal: Goal::Joints(vec![0.1; 6]) }).collect()
+    names.iter().map(|name| TaughtPose::new(*name, Goal::Joints(vec![0.1; 6]))).collect()
 }
 
 fn set_taught(change: TaughtChange, names: &[&str]) -> Edit {
@@ -109,6 +109,24 @@ fn taught_poses_change_only_as_the_edit_says() {
 }
 
 #[test]
+fn poses_of_two_cells_may_have_the_same_name_and_other_joints() {
+    let cell = |base: &str| {
+        Some(TaughtOn { base: base.into(), joints: Vec::new(), tip_at_zero_m: None, target: meta().target })
+    };
+    let on = |base: &str, joints| TaughtPose {
+        cell: cell(base),
+        ..TaughtPose::new("front", Goal::Joints(vec![0.1; joints]))
+    };
+    let first = Edit::SetTaught { change: TaughtChange::Replace, poses: vec![on("one", 6)] };
+    let add = TaughtChange::Add("front".into());
+    let both = Edit::SetTaught { change: add.clone(), poses: vec![on("one", 6), on("another", 7)] };
+    let before = after(&document(0), &first);
+    assert_eq!(after(&before, &both).taught.len(), 2);
+    let twice = Edit::SetTaught { change: add, poses: vec![on("one", 6), on("one", 6)] };
+    assert_eq!(before.apply(&twice), Err(EditError::SamePoseName("front".into())));
+}
+
+#[test]
 fn an_edit_that_does_not_fit_is_refused_with_the_reason() {
     let before = document(2);
     let unknown = Err(EditError::UnknownCapture(CaptureId(3)));
@@ -193,7 +211,7 @@ fn edits_read_back_as_they_were_written() {
         Edit::SetCamera(meta().camera),
         Edit::SetTaught {
             change: TaughtChange::Rename { from: "a\n".into(), to: "b".into() },
-            poses: vec![TaughtPose { name: "b".into(), goal: Goal::Tip(record(1).base_from_tip) }],
+            poses: vec![TaughtPose::new("b", Goal::Tip(record(1).base_from_tip))],
         },
         Edit::SetExportNames(json!({"a": [1, 0.1, null]})),
     ];

@@ -221,7 +221,7 @@ fn entry(step: &Step, history: &History) -> Entry {
             let joints = |i: usize| {
                 if i.is_multiple_of(2) { Goal::Joints(vec![angles[i]; 6]) } else { Goal::Tip(pose(i as u8)) }
             };
-            let poses = (0..angles.len()).map(|i| TaughtPose { name: format!("p{i}"), goal: joints(i) }).collect();
+            let poses = (0..angles.len()).map(|i| TaughtPose::new(format!("p{i}"), joints(i))).collect();
             Edit::SetTaught { change: TaughtChange::Replace, poses }
         }
         Step::Names(name) => Edit::SetExportNames(json!({ "base": name })),

@@ -1,15 +1,14 @@
 //! The window over drivers: programs of their own, two clocks, a driver that is killed, a robot whose poses are typed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command as Program;
 
 use handeye_app::command::Command;
-use handeye_app::guided::state::Waits;
 use handeye_app::limits;
 use handeye_app::model::{CapturePurpose, CellSource, Drivers, LinkState, Model, Motion, SolveStatus};
 use handeye_core::geometry::frames::{Camera, Pose, Tip};
 use handeye_core::plan::guided::CHECKS;
-use handeye_core::project::taught_poses::Goal;
+use handeye_core::project::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::{Scene, ShippedScene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
@@ -32,6 +31,10 @@ fn driver(cell: &Endpoint, part: &str, clock_s: f64) -> String {
 
 fn arm(cell: &Endpoint) -> Arm {
     Arm::connect(cell, &ConnectionOptions::default(), &CellPaths::default()).expect("the cell")
+}
+
+fn reference_poses() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml")
 }
 
 fn is_connected(model: &Model) -> bool {
@@ -70,12 +73,15 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     });
     bench.until("the robot", |model| model.robot.is_some());
 
+    assert!(bench.model().taught().is_empty(), "nobody has taught this arm anything");
+    bench.click(Command::ImportTaught(reference_poses()));
+    bench.until("the poses", |model| model.taught().len() == 10);
     bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("the refusal", |model| !model.sequence_runs);
     assert!(bench.said().contains("only read"), "nothing moves before somebody allows it: {}", bench.said());
     bench.click(Command::Arm(true));
     bench.until("the permission", Model::is_armed);
-    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.allow(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("five captures", |model| model.document().captures.len() >= 5);
 
     // Its process alone: the camera's goes on.
@@ -89,6 +95,8 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.click(Command::Arm(true));
     bench.until("the permission", Model::is_armed);
     bench.click(Command::ContinueSequence);
+    // The arm may stand there.
+    bench.click(Command::ConfirmMove);
     bench.until("the rest of the sequence", |model| !model.sequence_runs && model.motion == Motion::Idle);
     bench.until("a solution", is_solved);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
@@ -115,10 +123,7 @@ fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever
         bench.until("the permission", Model::is_armed);
         assert!(bench.model().confirms_moves(), "a real arm goes step by step");
         bench.click(Command::CalibrateForMe);
-        let waits = |model: &Model| {
-            let guided = model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref());
-            guided.is_some_and(|guided| guided.waits == Waits::Confirmation)
-        };
+        let waits = |model: &Model| model.asked.is_some();
         bench.until("the first move that waits", |model| waits(model) && model.document().captures.len() == 1);
         bench.click(Command::ConfirmMove);
         bench.until("the second", |model| waits(model) && model.document().captures.len() == 2);
@@ -141,7 +146,7 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut bench = bench(None, Some(driver(&endpoint, "camera", 0.0)), folder.path());
     assert!(bench.model().robot.is_none());
-    let taught = bench.model().document().taught.clone();
+    let taught = TaughtPoses::read(&reference_poses()).expect("they come with it").poses;
     let mut hand = arm(&endpoint);
     let cancel = CancelToken::default();
     for (number, pose) in taught.iter().enumerate().take(8) {

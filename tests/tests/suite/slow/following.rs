@@ -101,6 +101,8 @@ fn tracking_at(folder: &std::path::Path, file: &str, config: CellConfig, first: 
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("a solution", |model| model.solve.current().is_some());
     bench.click(Command::GoToCapture(first));
+    // The arm may be there already.
+    bench.click(Command::ConfirmMove);
     bench.until("the arm at the first pose", |model| model.motion == handeye_app::model::Motion::Idle);
     bench.click(Command::SetTracking(true));
     bench.until("the board", is_tracked);
@@ -276,6 +278,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
         );
         bench.click(Command::HideBoard(false));
         bench.click(Command::GoToCapture(FIRST));
+        bench.click(Command::ConfirmMove);
         bench.until("the arm at the first pose", |model| model.motion == handeye_app::model::Motion::Idle);
         bench.until("the board", is_tracked);
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command as Process, Output};
 
 use handeye_app::command::Command;
-use handeye_app::guided::state::{GuidedProgress, Waits};
+use handeye_app::guided::state::GuidedProgress;
 use handeye_app::model::{CellSource, JogSettings, Model, Motion, MotionGoal};
 use handeye_app::text::Text;
 use handeye_core::geometry::planar_pose;
@@ -90,7 +90,7 @@ fn connected(folder: &Path) -> (Workbench, CellServer) {
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("the board", |model| model.board_seen_s.is_some());
     bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
-    // Behind an address there may be a real arm, and each move waits for a person.
+    // Behind an address there may be a real arm, and each move waits for a person; the first one always does.
     bench.click(Command::SetConfirmMoves(false));
     (bench, cell)
 }
@@ -103,7 +103,7 @@ fn count(model: &Model, role: Role) -> usize {
 fn one_click_leads_from_the_board_in_view_to_a_checked_answer_below_the_goal() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.click(Command::CalibrateForMe);
+    bench.allow(Command::CalibrateForMe);
     bench.until("a choice", |model| {
         model.sequence.as_ref().and_then(|it| it.guided.as_ref()).is_some_and(|guided| guided.why.is_some())
     });
@@ -122,7 +122,7 @@ fn one_click_leads_from_the_board_in_view_to_a_checked_answer_below_the_goal() {
 fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.click(Command::CalibrateForMe);
+    bench.allow(Command::CalibrateForMe);
     bench.until("two captures", |model| count(model, Role::Calibration) >= 2);
     bench.click(Command::Stop);
     bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending && model.motion == Motion::Idle);
@@ -132,7 +132,7 @@ fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     bench.until("two seconds", |model| sim_time(model) > stopped_s + 2.0);
     assert_eq!(count(bench.model(), Role::Calibration), kept, "nothing goes on by itself");
     // Captures that there are count.
-    bench.click(Command::ContinueSequence);
+    bench.allow(Command::ContinueSequence);
     bench.until("the end", |model| !model.sequence_runs && count(model, Role::Verification) == 3);
     assert!(count(bench.model(), Role::Calibration) <= kept + 16);
 }
@@ -147,7 +147,7 @@ fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session
     let (mut bench, _cell) = connected(folder.path());
     bench.click(Command::SetConfirmMoves(true));
     bench.click(Command::CalibrateForMe);
-    let waits = |model: &Model| guided(model).is_some_and(|it| it.waits == Waits::Confirmation);
+    let waits = |model: &Model| guided(model).is_some() && model.asked.is_some();
     bench.until("a pose that waits", waits);
     let first = guided(bench.model()).expect("it runs").ahead[0].base_from_tip;
     bench.click(Command::SkipMove);

@@ -136,7 +136,8 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("passing time", |model| model.resting_simulation().is_none());
     // So many that the pause comes between two of them, however busy the machine is.
     bench.click(Command::SetCaptureOptions(CaptureOptions { frames: 32, ..CaptureOptions::default() }));
-    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("the reference poses", |model| model.taught().len() == 10);
+    bench.allow(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     let averages = |model: &Model| {
         let wait = model.capture.as_ref().map(|capture| capture.wait);
         matches!(wait, Some(CaptureWait::Images(Wait::Averaging { .. })))
@@ -150,6 +151,8 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.click(Command::SetCaptureOptions(CaptureOptions::default()));
     bench.click(Command::ContinueSequence);
+    // The arm may stand there.
+    bench.click(Command::ConfirmMove);
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
 }

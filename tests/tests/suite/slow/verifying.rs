@@ -40,7 +40,8 @@ fn poses(model: &Model, role: Role) -> Vec<Pose<Base, Tip>> {
 fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
-    bench.click(Command::VerifyAtPlanned);
+    bench.click(Command::SetConfirmMoves(false));
+    bench.allow(Command::VerifyAtPlanned);
     bench.until("the sequence", |model| model.sequence_runs);
     bench.until("its end", |model| !model.sequence_runs);
     bench.until("the verification", |model| {
@@ -66,7 +67,8 @@ fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
 fn a_stop_ends_the_verification_and_keeps_what_was_captured() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
-    bench.click(Command::VerifyAtPlanned);
+    bench.click(Command::SetConfirmMoves(false));
+    bench.allow(Command::VerifyAtPlanned);
     bench.until("a capture", |model| !poses(model, Role::Verification).is_empty());
     bench.click(Command::Stop);
     bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending && model.motion == Motion::Idle);

@@ -34,7 +34,8 @@ fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     bench.until("a cell", connected);
     bench.click(Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
-    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.until("the reference poses", |model| model.taught().len() == 10);
+    bench.allow(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     bench.until("a solution", idle_and_fresh);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
@@ -73,7 +74,7 @@ fn ten_poses_are_visited_captured_solved_verified_and_exported() {
     assert!(truth.focal_error_percent.is_some_and(|percent| percent < 0.2), "{truth:?}");
 
     // One more from between two poses, which verifies and never enters the fit.
-    bench.click(Command::GoToCapture(CaptureId(3)));
+    bench.allow(Command::GoToCapture(CaptureId(3)));
     bench.until("the arm at pose 3", |model| model.motion == handeye_app::model::Motion::Idle);
     bench.click(Command::SetCaptureOptions(handeye_app::model::CaptureOptions {
         least_distance_m: 0.0,
@@ -168,6 +169,7 @@ fn a_stop_ends_the_sequence_and_keeps_what_was_captured() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut bench = Workbench::start(CellSource::default(), folder.path(), None);
     bench.until("a cell", connected);
+    bench.until("the reference poses", |model| model.taught().len() == 10);
     bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("two captures", |model| model.document().captures.len() >= 2);
     bench.click(Command::Stop);
