@@ -2,6 +2,7 @@
 
 pub(crate) mod ask;
 pub(crate) mod desk;
+pub(crate) mod grip;
 pub(crate) mod jog_line;
 pub(crate) mod live;
 pub(crate) mod pane;
