@@ -35,7 +35,7 @@ pub enum ObserveError {
     },
     /// The images show a chessboard of another size than the one described.
     #[error(
-        "{columns} × {rows} inner corners were looked for and found in none of {images} images; {seen} of them show a \
+        "{columns} × {rows} inner corners were looked for and found in {found} of {images} images; {seen} of them show a \
          chessboard of {seen_columns} × {seen_rows} inner corners: columns and rows count inner corners, one fewer than \
          squares. Describe the target as it is"
     )]
@@ -44,6 +44,8 @@ pub enum ObserveError {
         columns: usize,
         /// Inner corners along y, as described.
         rows: usize,
+        /// Images that show it, or a part of the other one that looks like it.
+        found: usize,
         /// Images looked at.
         images: usize,
         /// Images that show the other one.
@@ -60,6 +62,12 @@ pub enum ObserveError {
 
 /// Part of the images with any grid in sight that must show the same one before it is taken for the target.
 const SAME: f64 = 2.0 / 3.0;
+
+/// Images that must show it where none shows the target: what one or two show may be no board.
+const LEAST_OTHER: usize = 3;
+/// And so many times as many as show the target, where some do: a board that is there is found in more than a fifth of the images
+/// in which boards are.
+const TIMES_OTHER: usize = 4;
 
 /// Called with how many images of how many are done, from the threads that do the work.
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
@@ -211,11 +219,10 @@ impl Look {
     }
 }
 
-/// Whether the images show a chessboard of another size, always the same, and never the one looked for.
+/// Whether the images show a chessboard of another size, always the same, and the one looked for never, or seldom: where the
+/// border of an image hides a column, a board with one column more looks like it.
 fn other_chessboard(looks: &[Look], grid: &Grid) -> Result<(), ObserveError> {
-    if looks.iter().any(|look| matches!(look, Look::Found(_))) {
-        return Ok(());
-    }
+    let found = looks.iter().filter(|look| matches!(look, Look::Found(_))).count();
     let mut seen = BTreeMap::<(usize, usize), usize>::new();
     for look in looks {
         if let Look::Missed(Some(sides)) = look {
@@ -225,12 +232,15 @@ fn other_chessboard(looks: &[Look], grid: &Grid) -> Result<(), ObserveError> {
     let with_any: usize = seen.values().sum();
     let Some((&(columns, rows), &count)) = seen.iter().max_by_key(|(_, count)| **count) else { return Ok(()) };
     let asked = (grid.columns.max(grid.rows), grid.columns.min(grid.rows));
-    if (columns, rows) == asked || (count as f64) < SAME * with_any as f64 || 2 * count < looks.len() {
+    let is_more =
+        if found == 0 { count >= LEAST_OTHER } else { 2 * count >= looks.len() && count > TIMES_OTHER * found };
+    if (columns, rows) == asked || (count as f64) < SAME * with_any as f64 || !is_more {
         return Ok(());
     }
     Err(ObserveError::OtherChessboard {
         columns: grid.columns,
         rows: grid.rows,
+        found,
         images: looks.len(),
         seen: count,
         seen_columns: columns,
@@ -256,4 +266,35 @@ fn of_each<T: Send>(
     // All of them before the first error: in parallel another one could come first.
     let each: Vec<_> = (0..count).into_par_iter().with_max_len(1).map(one).collect();
     each.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A board of ten columns that is said to have nine looks like one where the border of an image hides a column.
+    #[test]
+    fn a_board_with_a_column_more_is_named_although_some_images_hide_it() {
+        let grid = Grid { columns: 9, rows: 7, square_m: 0.02 };
+        let looks = |found: usize, other: usize, nothing: usize| -> Vec<Look> {
+            let found = (0..found).map(|_| Look::Found(Vec::new()));
+            let other = (0..other).map(|_| Look::Missed(Some((10, 7))));
+            found.chain(other).chain((0..nothing).map(|_| Look::Missed(None))).collect()
+        };
+        for (found, other, nothing) in [(0, 40, 0), (3, 30, 7), (7, 33, 0), (0, 4, 36)] {
+            let why =
+                other_chessboard(&looks(found, other, nothing), &grid).expect_err("it is another one").to_string();
+            assert!(
+                why.contains("9 × 7") && why.contains("10 × 7") && why.contains(&format!("in {found} of")),
+                "{why}"
+            );
+        }
+        // The target is there, and another board as well; or hardly anything is.
+        for (found, other, nothing) in [(10, 30, 0), (3, 10, 27), (0, 2, 38), (40, 0, 0)] {
+            assert!(other_chessboard(&looks(found, other, nothing), &grid).is_ok(), "{found} {other} {nothing}");
+        }
+        let mixed: Vec<Look> =
+            [(8, 5), (8, 6), (10, 7), (9, 6), (7, 7), (10, 7)].map(|sides| Look::Missed(Some(sides))).into();
+        assert!(other_chessboard(&mixed, &grid).is_ok(), "no two of them are the same");
+    }
 }

@@ -205,7 +205,13 @@ fn import(
     let (index, is_taken) = match choose(&judgement, args.take) {
         Ok(chosen) => chosen,
         Err(_) if is_open_in_mode && args.take.is_none() => {
-            return Err(refuse(Failure::failed(anyhow!("nothing was written. {}", asked_for_mode(args))), findings));
+            return Err(refuse(
+                Failure::failed(anyhow!(
+                    "nothing was written. {}\n  either one:    --take N, by its number in the list",
+                    asked_for_mode(args)
+                )),
+                findings,
+            ));
         }
         Err(failure) => return Err(refuse(failure, findings)),
     };
@@ -439,4 +445,34 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
         })).collect::<Vec<_>>(),
         "hypotheses": judgement.hypotheses.iter().enumerate().map(one).collect::<Vec<_>>(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ImportArgs,
+    }
+
+    /// What is printed to be copied is what was typed, with the choice, in words that a shell takes apart as they were.
+    #[test]
+    fn the_question_for_the_mode_gives_both_commands_ready_to_run() {
+        let typed =
+            ["handeye", "my data/it's", "--target", "10x7x15", "--set", "length_unit=mm", "--out", "set", "--link"];
+        let asked = asked_for_mode(&Line::parse_from(typed).args);
+        assert_eq!(asked.lines().count(), 3, "{asked}");
+        for mode in ["eye_in_hand", "eye_to_hand"] {
+            let command = format!(
+                "handeye import 'my data/it'\\''s' --target 10x7x15 --set length_unit=mm --set mode={mode} --out set --link"
+            );
+            assert!(asked.contains(&command), "{asked}");
+        }
+        let plain = asked_for_mode(&Line::parse_from(["handeye", "recording"]).args);
+        assert!(plain.contains("handeye import recording --set mode=eye_in_hand\n"), "{plain}");
+    }
 }

@@ -225,6 +225,10 @@ fn what_the_files_leave_open_is_listed_and_nothing_is_written() {
     let said = text(&run.stdout);
     assert!(said.contains("mode=eye_in_hand") && said.contains("mode=eye_to_hand"), "{said}");
     assert!(text(&run.stderr).contains("--take"), "{}", text(&run.stderr));
+    for mode in ["eye_in_hand", "eye_to_hand"] {
+        let command = format!("--set mode={mode} --out {}", out.display());
+        assert!(text(&run.stderr).contains(&command), "{}", text(&run.stderr));
+    }
     assert!(!out.exists(), "nothing is written");
     let known = ["--set", "mode=eye_to_hand"];
     let run = command().arg("import").arg(&folder).arg("--out").arg(&out).args(known).output().expect("it runs");

@@ -116,6 +116,7 @@ pub(super) fn is_significant(wald: f64, numbers: usize, freedom: f64, ln_alterna
     statistic.is_finite() && distribution.sf(statistic) * ln_alternatives.exp() < ALPHA
 }
 
+/// A hypothesis fitted and tested. What is asked of it besides, which takes most of the work, is for [`confirm`].
 pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: Candidate) -> Option<Judged> {
     let mut next = state.clone();
     let lens = model.sight.lens_count();
@@ -144,10 +145,6 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         }
     }
     let gain = 0.5 * freedom * (wald / freedom).ln_1p();
-    let held_out = match &candidate {
-        Candidate::Effect(_) => predicted(model, &next, before).zip(predicted(model, &next, &fit)),
-        Candidate::Views(_) => None,
-    };
     let level = |k: usize| (before.levels.noise[k].sqrt(), fit.levels.noise[k].sqrt());
     let mut judged = Judged {
         numbers,
@@ -159,22 +156,30 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         matters: false,
         ln_alternatives,
         as_good: false,
-        held_out,
+        held_out: None,
         robot: [level(0), level(1)],
         fit,
         state: next,
         candidate,
     };
     judged.matters = matters(model, &judged);
-    if let Candidate::Effect(effect @ (Effect::Scale | Effect::BoardMoved(_) | Effect::CameraMoved(_))) =
-        judged.candidate
-    {
-        judged.significant = judged.significant && is_more_than_a_field(model, &judged, effect);
-    }
     if let Candidate::Views(views) = &judged.candidate {
         judged.significant &= stand_apart(&judged, views);
     }
     Some(judged)
+}
+
+/// Whether it is more than errors of the arm, and how it predicts views that are left out.
+pub(super) fn confirm(model: &Model<'_>, before: &Fit, judged: &mut Judged) {
+    if matches!(judged.candidate, Candidate::Effect(_)) {
+        let with = &judged.state;
+        judged.held_out = predicted(model, with, before).zip(predicted(model, with, &judged.fit));
+    }
+    if let Candidate::Effect(effect @ (Effect::Scale | Effect::BoardMoved(_) | Effect::CameraMoved(_))) =
+        judged.candidate
+    {
+        judged.significant = judged.significant && is_more_than_a_field(model, judged, effect);
+    }
 }
 
 /// Whether an effect is significant beside errors of the arm in the axes of its base, too.
@@ -253,6 +258,7 @@ fn predicted(model: &Model<'_>, with: &State, fit: &Fit) -> Option<HeldOut> {
     let right = &normal * &fit.theta;
     let (mut squares, mut scores) = (0.0, Vec::with_capacity(inside.len()));
     for fold in 0..FOLDS.min(inside.len()) {
+        model.count_work(fit.width());
         let held: Vec<usize> = inside.iter().copied().skip(fold).step_by(FOLDS).collect();
         let (mut n, mut b) = (normal.clone(), right.clone());
         for &i in &held {

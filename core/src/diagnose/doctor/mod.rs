@@ -233,5 +233,11 @@ fn examine(
             if a.accepted && b.accepted { std::cmp::Ordering::Equal } else { b.gain.total_cmp(&a.gain) },
         )
     });
+    if selection.is_ended {
+        return Err(format!(
+            "so much is wrong that the examination was ended after {} findings: mend them and examine the session again for more",
+            selection.taken.len()
+        ));
+    }
     Ok(())
 }

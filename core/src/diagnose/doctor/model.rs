@@ -13,7 +13,9 @@
 //!
 //! Reference: Patterson & Thompson 1971 (restricted likelihood); Cook & Weisberg 1982 (deletion of cases).
 
+use std::cell::Cell;
 use std::ops::Range;
+use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
@@ -61,6 +63,9 @@ pub(super) struct Model<'a> {
     pub field: Option<Places>,
     /// Whether the field has a part in the axes of the base.
     in_base: bool,
+    /// Work that was done with it and with models that were made of it, in elements of normal equations that a view was added to:
+    /// what an examination costs, by a count that is the same on every machine.
+    work: Rc<Cell<u64>>,
 }
 
 /// Variances of the robot per axis, of position (m²) and of orientation (rad²).
@@ -130,7 +135,7 @@ impl<'a> Model<'a> {
                 }
             })
             .collect();
-        Self { sight, solution, rows, field, in_base: false }
+        Self { sight, solution, rows, field, in_base: false, work: Rc::default() }
     }
 
     /// The same with a field that has a part in the axes of the base, too; `None` where there is none to be had.
@@ -140,8 +145,8 @@ impl<'a> Model<'a> {
     /// size of the target, or like a move. An effect beside both parts is more than that.
     pub fn with_field_in_base(&self) -> Option<Self> {
         let field = Places::for_field(self.sight.views.iter().map(|view| &view.base_from_tip))?;
-        let (sight, solution, rows) = (self.sight, self.solution, self.rows.clone());
-        Some(Self { sight, solution, rows, field: Some(field), in_base: true })
+        let (sight, solution, rows, work) = (self.sight, self.solution, self.rows.clone(), Rc::clone(&self.work));
+        Some(Self { sight, solution, rows, field: Some(field), in_base: true, work })
     }
 
     /// The same views at the solution that a fit found.
@@ -151,7 +156,17 @@ impl<'a> Model<'a> {
             mount_from_camera: self.solution.mount_from_camera.perturbed(&step(0)),
             anchor_from_target: self.solution.anchor_from_target.perturbed(&step(6)),
         };
-        Self::new(self.sight, solution, self.field)
+        Self { work: Rc::clone(&self.work), ..Self::new(self.sight, solution, self.field) }
+    }
+
+    /// Takes account of normal equations of so many unknowns that every view was added to.
+    pub fn count_work(&self, width: usize) {
+        self.work.set(self.work.get() + (self.rows.len() * width * width) as u64);
+    }
+
+    /// The work so far.
+    pub fn work(&self) -> u64 {
+        self.work.get()
     }
 
     /// Mean squared displacement of the board by a residual, as a length, metres.
@@ -253,6 +268,7 @@ impl<'a> Model<'a> {
         let floor = |v: f64| v.max(LEAST * LEAST);
         let mut levels = Levels { noise: start.noise.map(floor), field: start.field.map(floor) };
         for step in 0..=MAX_STEPS {
+            self.count_work(width);
             let solved = self.solve(state, &inside, &designs, levels)?;
             if step == MAX_STEPS {
                 return Some(self.finished(solved, levels, designs, &inside));

@@ -2,7 +2,7 @@
 //! judged anew beside it.
 
 use super::agreement::Agreement;
-use super::judge::{Judged, alternatives, is_significant, judge};
+use super::judge::{Judged, alternatives, confirm, is_significant, judge};
 use super::model::{Fit, Levels, Model, State};
 use super::screen::{Candidate, screened};
 use super::views::SessionViews;
@@ -20,6 +20,9 @@ const FAR: f64 = 5.0;
 const ROUNDS: usize = 3;
 /// Hypotheses taken in at the most, which bounds the work: one for every view that is an outlier by itself, and some more.
 const MOST_TAKEN: usize = 12;
+/// Work after which no more is taken in, as [`Model::work`] counts it; a round of hypotheses beside each other may go a little
+/// beyond it, and that more is wrong is said. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
+const MOST_WORK: u64 = 100_000_000;
 /// Views that are tested together at the most.
 const MOST_TOGETHER: usize = 40;
 
@@ -32,6 +35,8 @@ pub(super) struct Selection<'a> {
     pub model: Model<'a>,
     /// The last fit.
     pub fit: Fit,
+    /// More would have been taken in, and the work was ended.
+    pub is_ended: bool,
 }
 
 /// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
@@ -55,6 +60,7 @@ pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work
     let mut state = State::default();
     let mut fit = model.fit(&state, levels)?;
     let (mut taken, mut others): (Vec<Judged>, Vec<Judged>) = (Vec::new(), Vec::new());
+    let mut is_ended;
     loop {
         if work.is_cancelled() {
             return None;
@@ -67,10 +73,19 @@ pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work
         }
         let mut judged: Vec<Judged> = candidates.into_iter().filter_map(|c| judge(&model, &state, &fit, c)).collect();
         judged.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let best = judged.iter().position(Judged::holds).filter(|_| taken.len() < MOST_TAKEN);
+        let mut best = None;
+        for (i, judged) in judged.iter_mut().enumerate() {
+            // Beside others only the best is asked for; alone, all of them are listed.
+            if taken.is_empty() || best.is_none() {
+                confirm(&model, &fit, judged);
+                best = best.or_else(|| judged.holds().then_some(i));
+            }
+        }
+        let best = best.filter(|_| taken.len() < MOST_TAKEN);
+        is_ended = best.is_some() && !taken.is_empty() && model.work() > MOST_WORK;
         let mut taken_now = None;
         for (i, j) in judged.into_iter().enumerate() {
-            if Some(i) == best {
+            if Some(i) == best && !is_ended {
                 taken_now = Some(j);
             } else if taken.is_empty() {
                 others.push(j);
@@ -88,7 +103,7 @@ pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work
             other.as_good = other.explains_as_much_as(first);
         }
     }
-    Some(Selection { taken, others, model, fit })
+    Some(Selection { taken, others, model, fit, is_ended })
 }
 
 fn same_kind(a: &Candidate, b: &Candidate) -> bool {
@@ -116,5 +131,38 @@ fn drop_overtaken(model: &Model<'_>, state: &mut State, fit: &mut Fit, taken: &m
         state.effects.retain(|e| *e != weak);
         taken.retain(|j| j.candidate != Candidate::Effect(weak));
         *fit = model.fit(state, fit.levels)?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::*;
+    use crate::diagnose::doctor::{diagnose, gross};
+    use crate::diagnose::findings::FindingOptions;
+    use crate::estimate::handeye::Mode;
+    use crate::progress::CancelToken;
+    use crate::testing::faulty::{Setup, session};
+
+    /// A real session in which every fourth view is wrong, each in a way of its own and less than grossly.
+    #[test]
+    fn a_session_with_much_wrong_is_examined_within_bounds_and_the_end_is_said() {
+        for (views, joints) in [(40, false), (100, false), (100, true)] {
+            let mut observations = session(&Setup { joints, ..Setup::new(Mode::EyeInHand, views, 5) });
+            for (i, view) in observations.views.iter_mut().enumerate().filter(|(i, _)| i % 4 == 1) {
+                let off =
+                    Vector6::from_fn(|k, _| (((i * 7 + k * 5) % 11) as f64 - 5.0) * if k < 3 { 1.5e-3 } else { 3e-3 });
+                view.base_from_tip = view.base_from_tip.map(|pose| pose.perturbed(&off));
+            }
+            let cancel = CancelToken::default();
+            let sight = SessionViews::new(&observations, None).expect("views");
+            let start = gross::gross(&sight, &(&cancel).into()).expect("not cancelled").as_given.expect("a solution");
+            let selection = select(&sight, &start, &(&cancel).into()).expect("selected");
+            assert!(selection.model.work() < 2 * MOST_WORK, "{views}: {}", selection.model.work());
+            let diagnosis = diagnose(&observations, None, &FindingOptions::default(), &cancel);
+            assert!(!diagnosis.is_healthy());
+            assert_eq!(selection.is_ended, diagnosis.untested.is_some_and(|why| why.contains("was ended after")));
+        }
     }
 }
