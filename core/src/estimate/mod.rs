@@ -13,6 +13,7 @@ mod lens;
 mod pairs;
 mod refine;
 mod residuals;
+pub(crate) mod resolution;
 pub mod shared_lens;
 mod two_poses;
 pub mod uncertainty;
