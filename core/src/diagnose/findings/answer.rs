@@ -175,6 +175,19 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
         without = shown(without, 2),
         with = shown(with, 2)
     );
+    let text = match joint.open_size() {
+        Some(size) => Text::sentences([
+            text,
+            text!(
+                "Another size of the target would look the same: by the robot's motion it is {size} ± {sigma} times the stated one, so \
+                 that a wrong size would not be noticed, and the expected error counts on it. Measure the target over as many squares \
+                 as it has, and take views from more different distances.",
+                size = shown(size.scale, 3),
+                sigma = shown(size.sigma, 3)
+            ),
+        ]),
+        None => text,
+    };
     let finding = Finding::new(FindingCode::RobotField, Severity::Advice, text);
     let finding = finding.with("field_sigma", mm, "mm").with("field_sigma_angle", deg, "°");
     Some(finding.with("heldout_rms", without, "px").with("heldout_rms_corrected", with, "px"))
