@@ -30,6 +30,19 @@ impl Catalogue for English {
     }
 }
 
+/// Decimals that a number is shown with: so many at the least, and as many as a figure that is no zero takes.
+pub fn decimals(value: f64, least: usize) -> usize {
+    /// Beyond it is the rounding of what was computed.
+    const MOST: usize = 9;
+    let first = -value.abs().log10().floor();
+    if first.is_finite() { (first.max(0.0) as usize).clamp(least, MOST.max(least)) } else { least }
+}
+
+/// A number with `least` decimals, and with more where these would all be zero.
+pub fn shown(value: f64, least: usize) -> String {
+    format!("{value:.*}", decimals(value, least))
+}
+
 /// A sentence with values in it.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Text {

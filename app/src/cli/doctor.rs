@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::diagnose::doctor::diagnose;
+use handeye_core::diagnose::doctor::{Detail, diagnose};
 use handeye_core::diagnose::findings::FindingOptions;
 use handeye_core::estimate::handeye::HandEyeError;
 use handeye_core::estimate::{CalibrateError, Method, calibrate};
@@ -22,6 +22,9 @@ pub struct DoctorArgs {
     /// The expected error to reach, millimetres (95 %).
     #[arg(long, value_name = "MM")]
     goal: Option<f64>,
+    /// List every hypothesis that was tested, with what it explains.
+    #[arg(long)]
+    all: bool,
 }
 
 /// Prints the diagnosis. A session that is ill is an answer, not a failure: the exit code is 0.
@@ -48,5 +51,8 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
         let text = serde_json::to_string_pretty(&diagnosis).map_err(Failure::failed)?;
         output.write(format!("{text}\n").as_bytes())?;
     }
-    if args.json.as_ref().is_some_and(Output::is_standard) { Ok(()) } else { out::print(&diagnosis.report()) }
+    if args.json.as_ref().is_some_and(Output::is_standard) {
+        return Ok(());
+    }
+    out::print(&diagnosis.report(if args.all { Detail::All } else { Detail::Found }))
 }

@@ -3,6 +3,7 @@
 use handeye_core::estimate::GOOD_VIEWS;
 use handeye_core::estimate::handeye::motion::MIN_VIEWS;
 use handeye_core::project::session::Role;
+use handeye_core::verify::Verification;
 
 use super::status::STALE_AFTER_S;
 use crate::gui::style::numbers;
@@ -60,6 +61,8 @@ pub struct Facts {
     pub verifying: usize,
     /// They were compared with the answer.
     pub verified: bool,
+    /// And their errors are larger than the answer states.
+    pub contradicted: bool,
     /// Files of the present answer were written.
     pub exported: bool,
     /// The board is being tracked.
@@ -92,6 +95,10 @@ impl Facts {
             sequence_runs: model.sequence_runs,
             verifying: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
+            contradicted: current.is_some_and(|solved| {
+                let verification = solved.verification.as_ref().and_then(|outcome| outcome.as_ref().ok());
+                verification.and_then(Verification::is_as_stated) == Some(false)
+            }),
             exported: model.export.is_present && current.is_some(),
             tracking: model.track.on,
             out_of_sight: model.track.newest.as_ref().is_some_and(|newest| newest.update.estimate.is_none()),
@@ -177,6 +184,8 @@ fn solve(facts: &Facts) -> (StepState, Text) {
 fn verify(facts: &Facts) -> (StepState, Text) {
     match (facts.solved, facts.verified, facts.verifying) {
         (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
+        // What fails is never ticked.
+        (true, true, _) if facts.contradicted => (StepState::Now, text!("Errors larger than stated")),
         (true, true, count) => (StepState::Done, text!("{count} {count|capture|captures}", count = count)),
         (true, false, _) => (StepState::Now, text!("Not verified yet")),
     }
@@ -251,6 +260,14 @@ mod tests {
         assert_eq!((said(&facts)[4].0, said(&facts)[5].0), (StepState::Now, StepState::Now));
         facts.solving = true;
         assert_eq!(said(&facts)[3].0, StepState::Now, "an answer that is being replaced is not done");
+    }
+
+    #[test]
+    fn a_verification_that_fails_is_not_ticked() {
+        let facts = Facts { captures_in_use: 10, solved: true, verifying: 4, verified: true, ..Facts::default() };
+        assert_eq!(said(&facts)[4], (StepState::Done, "4 captures".to_owned()));
+        let failed = said(&Facts { contradicted: true, ..facts });
+        assert_eq!(failed[4], (StepState::Now, "Errors larger than stated".to_owned()));
     }
 
     #[test]

@@ -89,13 +89,20 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
     };
     let stated =
         format!("expected error of a measured point: below {error:.3} mm in 95 % of cases, where the target was seen");
-    let estimate = result.estimate.as_ref();
-    Some(match estimate.and_then(|estimate| estimate.moved_mm.zip(estimate.modelled_error_95_mm)) {
-        Some((moved, modelled)) => format!(
-            "{stated}: what is found below would move the answer by {moved:.3} mm, the noise alone makes {modelled:.3} mm"
-        ),
+    Some(match result.estimate.as_ref().and_then(|estimate| estimate.moved_mm) {
+        Some(moved) => {
+            let (moved, rest) = in_parts(error, moved);
+            format!("{stated}: what is found below would move the answer by {moved} mm, which is known to {rest} mm")
+        }
         None => stated,
     })
+}
+
+/// What was found moves the answer by and what remains of an error, in millimetres: they add up as they are printed.
+pub fn in_parts(error_mm: f64, moved_mm: f64) -> (String, String) {
+    let micrometres = |mm: f64| (mm * 1e3).round();
+    let rest = micrometres(error_mm) - micrometres(moved_mm);
+    (format!("{moved_mm:.3}"), format!("{:.3}", rest / 1e3))
 }
 
 /// What the standard deviations are: with something found that is not in the model they are no error of the answer.
@@ -186,6 +193,15 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
             out.push(format!("target {:.5} ± {sigma:.5} times its stated size", board.scale));
         }
     }
+    // One size: that which is estimated, or else what the robot's motion says of the one that is taken as stated.
+    let estimated = estimate.board.as_ref().is_some_and(|board| board.scale_sigma.is_some());
+    if let Some(size) = estimate.target_size.filter(|_| !estimated) {
+        let (scale, sigma) = (size.true_over_stated, size.sigma);
+        let unsure = if size.determined { "" } else { ": another size would not be noticed" };
+        out.push(format!(
+            "target {scale:.5} ± {sigma:.5} times its stated size by the robot's motion, taken as stated{unsure}"
+        ));
+    }
     if let Some(field) = &estimate.robot_field {
         let with = field
             .heldout_rms_px
@@ -269,12 +285,19 @@ fn verification(solved: &Solved) -> Option<Section> {
         let mm = check.centre_error_m.norm() * 1e3;
         Line::row(&check.name, [format!("{:.4} px", check.rms_px), format!("{mm:.3} mm")])
     });
+    let verdict = verification
+        .is_as_stated()
+        .map(|is_as_stated| if is_as_stated { "no larger than stated" } else { "LARGER THAN STATED" });
     Some(Section {
         title: format!("verification on {captures} not in the fit"),
-        summary: vec![
-            format!("{:.4} px RMS", verification.rms_px),
-            format!("middle of the board {mm:.3} mm and {deg:.4}° RMS"),
-        ],
+        summary: [
+            Some(format!("{:.4} px RMS", verification.rms_px)),
+            Some(format!("middle of the board {mm:.3} mm and {deg:.4}° RMS")),
+            verdict.map(str::to_owned),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         lines: lines.collect(),
         name_width: 24,
     })

@@ -143,6 +143,7 @@ fn summary(verification: &Verification) -> VerificationSummary {
         rms_px: verification.rms_px,
         centre_rms_mm: verification.centre_rms_m * 1e3,
         orientation_rms_deg: verification.orientation_rms_rad.to_degrees(),
+        as_stated: verification.is_as_stated(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Calibrations and diagnoses, as the documents that the command line writes.
 
-use handeye_core::diagnose::doctor::{self, Diagnosis};
+use handeye_core::diagnose::doctor::{self, Detail, Diagnosis};
 use handeye_core::diagnose::findings::{Finding, FindingOptions};
 use handeye_core::estimate::handeye::HandEyeError;
 use handeye_core::estimate::{CalibrateError, Calibration, Method, Options, calibrate_with};
@@ -68,7 +68,7 @@ pub fn diagnose(
             return Err(HandEyeError::Cancelled.into());
         }
         let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| Failure::NoAnswer(error.to_string()))?;
-        Ok((json, diagnosis.report(), diagnosis.is_healthy()))
+        Ok((json, diagnosis.report(Detail::Found), diagnosis.is_healthy()))
     })
 }
 

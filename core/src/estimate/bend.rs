@@ -3,6 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
+use crate::estimate::resolution;
+
 /// Significance from which a bent target is taken into the model: by chance one flat target in a thousand.
 const LEVEL: f64 = 1e-3;
 /// Part of the least limit of the ratio that it has to have before the degrees of freedom are known: a step from a flat fit and
@@ -40,6 +42,6 @@ impl Deflection {
         let ratio = self.warp_m.dot(&(inverse * self.warp_m)) / 2.0;
         let freedom = self.degrees_of_freedom.min(MANY);
         let limit = FisherSnedecor::new(2.0, freedom).map_or(f64::INFINITY, |f| f.inverse_cdf(1.0 - LEVEL));
-        ratio > limit && self.warp_m.norm() > MATTERS * self.noise_m
+        ratio > limit && self.warp_m.norm() > (MATTERS * self.noise_m).max(resolution::PLACE_M)
     }
 }

@@ -56,14 +56,20 @@ impl Claim {
     /// An alternative adds how far it moves the point to the error that remains: that of the model, or that under the
     /// alternative where it is larger, because what it moves is known only so well.
     pub fn error_95_m(&self, covariance: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> Option<f64> {
+        self.parts_95_m(covariance, law, point).map(|(moved_m, rest_m)| moved_m + rest_m)
+    }
+
+    /// The two parts of that error: how far the explanation that makes it largest would move the point, and what remains.
+    pub fn parts_95_m(&self, covariance: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> Option<(f64, f64)> {
         let modelled = tip_error_95_at(covariance, law, point);
         match self {
-            Self::AsModelled => Some(modelled),
+            Self::AsModelled => Some((0.0, modelled)),
             Self::Nothing => None,
             Self::Moved(alternatives) => {
                 let under =
-                    |a: &Alternative| a.moved_m(point) + tip_error_95_at(&a.covariance, law, point).max(modelled);
-                Some(alternatives.iter().map(under).fold(modelled, f64::max))
+                    |a: &Alternative| (a.moved_m(point), tip_error_95_at(&a.covariance, law, point).max(modelled));
+                let larger = |a: (f64, f64), b: (f64, f64)| if b.0 + b.1 > a.0 + a.1 { b } else { a };
+                Some(alternatives.iter().map(under).fold((0.0, modelled), larger))
             }
         }
     }
@@ -92,6 +98,8 @@ mod tests {
         let both = Claim::Moved(vec![moved, turned]);
         assert!((error(&both) - (0.01 + plain)).abs() < 2e-6);
         assert!((both.moved_m(&point) - 0.01).abs() < 1e-6);
+        let (moved, rest) = both.parts_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).expect("stated");
+        assert!((moved - 0.01).abs() < 1e-6 && moved + rest == error(&both), "the parts are those of one explanation");
         assert!(Claim::Nothing.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).is_none());
     }
 }

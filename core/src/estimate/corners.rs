@@ -318,6 +318,7 @@ fn take_joint(
             warp_sigma_m: solution.warp_covariance().map(|c| [c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
             scale_sigma: solution.scale_sigma(),
         }),
+        size: judged.size,
         joint_offsets: refined.joints.clone(),
     });
     let points = problem.board.points(&solution.shape);

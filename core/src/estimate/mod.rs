@@ -13,14 +13,16 @@ mod lens;
 mod pairs;
 mod refine;
 mod residuals;
+pub(crate) mod resolution;
 pub mod shared_lens;
+pub(crate) mod size;
 mod two_poses;
 pub mod uncertainty;
 mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 
-use crate::estimate::claim::Claim;
+use crate::estimate::claim::{Alternative, Claim};
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{Free, Noise, RobotField, ShownDistortion, SmallSample};
@@ -192,6 +194,19 @@ pub struct ShapeEstimate {
     pub scale_sigma: Option<f64>,
 }
 
+/// The size of the target by the robot's motion, everything that the answer counts on being free beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetSize {
+    /// True over stated size.
+    pub scale: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// Degrees of freedom of that.
+    pub degrees_of_freedom: f64,
+    /// The hand-eye transform with a target of that size, by what is known of sizes beforehand.
+    pub with: Alternative,
+}
+
 /// Why there is no calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -314,6 +329,15 @@ impl Calibration {
         self.claim.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
     }
 
+    /// How far what was found and the answer does not count on would move a point where the camera saw the target, metres: a
+    /// part of [`Self::tip_error_95_m`]. `None` where nothing of the kind was found, or nothing may be stated.
+    pub fn moved_m(&self) -> Option<f64> {
+        let joint = self.joint.as_ref()?;
+        let (covariance, law) = (self.hand_eye_covariance()?, joint.small_sample);
+        let (moved_m, _) = self.claim.parts_95_m(covariance, law, &joint.reference_point)?;
+        (moved_m >= resolution::PLACE_M).then_some(moved_m)
+    }
+
     /// The same where the camera saw the target by the noise alone, as if the model were true whatever was found.
     pub fn modelled_error_95_m(&self) -> Option<f64> {
         self.modelled_error_95_at(&self.joint.as_ref()?.reference_point)
@@ -429,8 +453,18 @@ pub struct JointFit {
     pub robot_effect_px: f64,
     /// The shape of the target when it was estimated.
     pub shape: Option<ShapeEstimate>,
+    /// Its size by the robot's motion; `None` where that says nothing of it.
+    pub size: Option<TargetSize>,
     /// What an attempt at joint offsets gave; `None` when there was none.
     pub joint_offsets: Option<JointOffsets>,
+}
+
+impl JointFit {
+    /// The size of the target where the robot's field leaves it open whether it is the stated one.
+    pub fn open_size(&self) -> Option<&TargetSize> {
+        self.field.as_ref()?;
+        self.size.as_ref().filter(|size| !self.free.scale && !size.is_determined())
+    }
 }
 
 /// What one closed form said.

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector2};
 
 use super::bend::{Deflection, may_be_shown};
 use super::lens::Lens;
-use super::{CalibrateError, JointOffsets, MethodResult, Options};
+use super::{CalibrateError, JointOffsets, MethodResult, Options, TargetSize, size};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::{Consensus, consensus, half_turn_about};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
@@ -251,6 +251,7 @@ pub struct Judged {
     pub robot_effect_px: f64,
     pub widening: Widening,
     pub error_curve: ErrorCurve,
+    pub size: Option<TargetSize>,
 }
 
 /// Error on held-out views, whether the covariance is true to the data, error by number of views. The covariance is
@@ -263,6 +264,7 @@ pub fn judge(
     let heldout = quality::held_out(problem, solution, *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = widening::check(problem, solution, work.cancel)?;
+    let size = size::size(problem, solution, work.cancel)?.map(|size| size.widened(widening.factor));
     solution.widen(widening.factor);
     Ok(Judged {
         heldout,
@@ -270,5 +272,6 @@ pub fn judge(
         robot_effect_px: expected.robot_px,
         widening,
         error_curve: joint::prediction::error_by_views(problem, solution, *work)?,
+        size,
     })
 }

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::estimate::resolution;
 use crate::targets::observation::Corner;
 
 /// A corner is wrong beyond so many times the residual that nine in ten corners stay below: seven and a half standard
@@ -14,10 +15,11 @@ const LEAST_PART: f64 = 0.5;
 /// And so many of them, which a pose takes.
 const LEAST: usize = 4;
 
-/// The length of a residual beyond which a corner is wrong, in the unit of the lengths of all corners; `None` without any.
+/// The length of a residual \[px\] beyond which a corner is wrong, by the lengths of all corners; `None` without any.
 pub(super) fn limit(mut lengths: Vec<f64>) -> Option<f64> {
     lengths.sort_by(f64::total_cmp);
-    lengths.get((COMMON * lengths.len() as f64) as usize).map(|common| TIMES_COMMON * common)
+    let common = lengths.get((COMMON * lengths.len() as f64) as usize);
+    common.map(|common| (TIMES_COMMON * common).max(resolution::FINE_PX))
 }
 
 /// Whether the corners of a view that are left are enough.

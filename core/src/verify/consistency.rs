@@ -7,13 +7,15 @@
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
 //! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
 //!
-//! The noise levels are taken as known. From a dozen views they are known to a fifth, and the ratio as badly.
+//! The noise levels are taken as known. From a dozen views they are known to a fifth, and the ratio as badly. They are at least
+//! what robots and cameras resolve ([`resolution`]): a simulated cell may be exact, and thousandths of a millimetre are no failure.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
 use super::{CaptureCheck, Predictor, Uncertainty};
 use crate::estimate::handeye::joint::chain::Chain;
 use crate::estimate::handeye::joint::field::{self, SLOPES};
+use crate::estimate::resolution;
 use crate::geometry::se3;
 use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
 use crate::targets::bent::BoardPoints;
@@ -72,7 +74,8 @@ impl Sums {
         if uncertainty.covariance.shape() != (n, n) {
             return None;
         }
-        let (m, rad) = (uncertainty.noise.robot_m.powi(2), uncertainty.noise.robot_rad.powi(2));
+        let judged_by = resolution::judged_by(&uncertainty.noise);
+        let (m, rad) = (judged_by.robot_m.powi(2), judged_by.robot_rad.powi(2));
         Some(Self {
             root: Cholesky::new(uncertainty.covariance.clone())?.l(),
             covariance: uncertainty.covariance.clone(),
@@ -124,7 +127,7 @@ impl Sums {
             by_shared.columns_mut(LINKS + form + joints, SLOPES).copy_from(&columns);
         }
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
-            + pose_covariance * self.corner_variance;
+            + pose_covariance * resolution::pose_variance_px2(self.corner_variance, view.corners.len());
         let error = se3::log((check.predicted_camera_from_target.inverse() * check.seen_camera_from_target).isometry());
 
         let both = own + &by_shared * &self.covariance * by_shared.transpose();

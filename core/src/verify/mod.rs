@@ -156,6 +156,13 @@ pub struct Verification {
     pub consistency: Option<Consistency>,
 }
 
+impl Verification {
+    /// Whether the errors are no larger than the calibration states; `None` where it states nothing.
+    pub fn is_as_stated(&self) -> Option<bool> {
+        self.consistency.map(|consistency| consistency.is_consistent())
+    }
+}
+
 /// Checks a calibration with captures that were never in its fit. `work` is a `&CancelToken`, or a [`Work`] to follow the
 /// progress.
 ///

@@ -96,6 +96,23 @@ fn errors_that_the_calibration_does_not_state_are_found() {
 }
 
 #[test]
+fn thousandths_of_a_millimetre_are_no_failure_of_an_exact_calibration_and_tenths_are() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let t = trial(mode, 12, &Noise { corner_px: 5e-4, ..Noise::EXACT }, camera(), 74);
+        let calibrated = calibrated(&t, 8, false);
+        for (off_m, holds) in [(6e-6, true), (1e-4, false)] {
+            let mut later = t.views[8..].to_vec();
+            for (view, side) in later.iter_mut().zip([1.0, -1.0, 1.0, -1.0]) {
+                let off = Vector6::new(off_m * side, off_m, -off_m, 0.0, 0.0, 0.0);
+                view.base_from_tip = view.base_from_tip.perturbed(&off);
+            }
+            let v = check_all(&calibrated, &later);
+            assert_eq!(v.is_as_stated(), Some(holds), "{mode:?}, {off_m} m: {:?}", v.consistency);
+        }
+    }
+}
+
+#[test]
 fn a_corner_of_the_board_is_measured_where_it_is_by_depth_and_by_the_plane_of_the_board() {
     let exact = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {

@@ -10,6 +10,7 @@ mod faults;
 
 use std::collections::BTreeMap;
 
+use handeye_core::diagnose::doctor::Detail;
 use handeye_core::diagnose::findings::Severity;
 use handeye_core::wording::English;
 
@@ -24,7 +25,7 @@ fn as_met(first: u64, sessions: u64) {
         let (observations, setup) = faults::as_met(20_000 + seed);
         let diagnosis = faults::examined(&observations);
         if sessions == 1 {
-            println!("{}", diagnosis.report());
+            println!("{}", diagnosis.report(Detail::All));
         }
         let named: Vec<_> =
             diagnosis.findings.iter().filter(|finding| faults::names_a_cause(finding, &setup)).collect();
@@ -103,7 +104,7 @@ fn main() {
     }
     if let Some(text) = arguments.next_if(|a| a.parse::<u64>().is_err()) {
         for case in cases::cases().iter().filter(|c| c.name.contains(&text)) {
-            println!("{}\n{}", case.name, faults::examined(&case.observations).report());
+            println!("{}\n{}", case.name, faults::examined(&case.observations).report(Detail::All));
         }
         return;
     }

@@ -6,20 +6,21 @@ mod cases;
 mod faults;
 
 use handeye_core::diagnose::doctor::diagnose;
-use handeye_core::diagnose::findings::{FindingCode, FindingOptions, Severity};
+use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::closed_form;
-use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
+use handeye_core::estimate::{Calibration, Method, Observations, ViewStatus, calibrate};
+use handeye_core::geometry::frames::Pose;
 use handeye_core::geometry::planar_pose;
 use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::progress::CancelToken;
-use handeye_core::testing::faulty::{self, Fault, Setup, session};
+use handeye_core::testing::faulty::{self, ArmError, Fault, Setup, session};
 use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
 use handeye_core::testing::sessions::{GRID, camera};
 use handeye_core::wording::Catalogue;
 
 use handeye_core::targets::TargetSpec;
-use nalgebra::Vector6;
+use nalgebra::{SMatrix, Vector2, Vector6};
 
 #[test]
 fn every_degenerate_or_hostile_session_gets_its_code_and_none_is_called_healthy() {
@@ -51,6 +52,65 @@ fn healthy_sessions_raise_no_alarm() {
         let diagnosis = faults::examined(&faults::healthy(seed));
         let grave: Vec<_> = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning).collect();
         assert!(diagnosis.is_healthy(), "session {seed}: {grave:?} {:?}", diagnosis.untested);
+    }
+}
+
+/// A session of a simulator: an exact robot, whose poses are written to a micrometre, and corners as a renderer draws them, to
+/// thousandths of a pixel; one image is a little worse, and one corner in it.
+fn simulated(mode: Mode, estimated: bool, seed: u64) -> Observations {
+    let exact = Setup { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, estimated, ..Setup::new(mode, 12, seed) };
+    let mut session = session(&exact);
+    for (i, view) in session.views.iter_mut().enumerate() {
+        let px = if i == 2 { 0.006 } else { 0.0012 };
+        for (k, corner) in view.corners.iter_mut().flatten().enumerate() {
+            // What a view shares, and what neighbours along a row do.
+            let (shared, own) = ((7.3 * i as f64).sin(), (0.9 * (k + 5 * i) as f64).sin());
+            corner.px += Vector2::new(0.7 * shared + 0.5 * own, 0.7 * shared - 0.5 * own) * px;
+            if (i, k) == (2, 33) {
+                corner.px.x += 0.03;
+            }
+        }
+        let rounded = |pose: Pose<_, _>| {
+            let mut pose = *pose.isometry();
+            pose.translation.vector.apply(|v| *v = (*v * 1e6).round() * 1e-6);
+            Pose::from_isometry(pose)
+        };
+        view.base_from_tip = view.base_from_tip.map(rounded);
+    }
+    session
+}
+
+/// A number that is nothing but zeros, with decimals: a value that is too small for how it is printed.
+fn printed_zero(text: &str) -> Option<&str> {
+    let numbers = text.split(|c: char| !(c.is_ascii_digit() || c == '.'));
+    numbers.filter(|word| word.contains('.') && word.len() > 2).find(|word| word.trim_matches(['0', '.']).is_empty())
+}
+
+#[test]
+fn an_exact_simulation_has_no_outlier_no_finding_and_no_printed_zero() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        for (estimated, seed) in [(false, 1), (false, 2), (true, 3), (true, 4)] {
+            let observations = simulated(mode, estimated, 40 + seed);
+            let cancel = CancelToken::default();
+            let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("solves");
+            let out = calibration.views.iter().filter(|view| view.status != ViewStatus::Used).count();
+            let aside: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
+            assert_eq!((out, aside), (0, 0), "{mode:?} {seed}");
+            let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+            let of_noise = |finding: &&Finding| {
+                use FindingCode as C;
+                let geometry =
+                    [C::PoorCoverage, C::WeakDirection, C::LittleTilt, C::WeakRotation, C::ClosedFormsDisagree];
+                !geometry.contains(&finding.code) && finding.code != C::UncertaintyWidened
+            };
+            let found: Vec<_> = diagnosis.findings.iter().filter(of_noise).collect();
+            assert!(found.is_empty() && diagnosis.untested.is_none(), "{mode:?} {seed}: {found:?}");
+            let accepted: Vec<_> = diagnosis.hypotheses.iter().filter(|h| h.accepted || h.significant).collect();
+            assert!(accepted.is_empty(), "{mode:?} {seed}: {accepted:?}");
+            for finding in &diagnosis.findings {
+                assert_eq!(printed_zero(&finding.to_string()), None, "{finding}");
+            }
+        }
     }
 }
 
@@ -101,6 +161,72 @@ fn the_scale_is_estimated_within_its_uncertainty_with_the_lens_given_estimated_o
         println!("lens {kind}: mean squared error over uncertainty {mean:.2}");
         assert!((0.1..2.6).contains(&mean), "lens {kind}: {mean}");
     }
+}
+
+#[test]
+fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline() {
+    let examined = |observations: &Observations| {
+        let cancel = CancelToken::default();
+        let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("solves");
+        let diagnosis = diagnose(observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+        (calibration, diagnosis)
+    };
+    let mut told_of_size = 0;
+    for seed in 0..6 {
+        let mode = if seed % 2 == 0 { Mode::EyeInHand } else { Mode::EyeToHand };
+        let estimated = seed > 2;
+        let fine =
+            Setup { corner_px: 0.03, robot_m: 2e-5, robot_rad: 5e-5, estimated, ..Setup::new(mode, 20, 900 + seed) };
+        for (warp_m, scale) in [(3e-3, 0.0), (0.0, 0.03)] {
+            let (calibration, diagnosis) =
+                examined(&session(&fine.clone().with(Fault { warp_m, scale, ..Fault::default() })));
+            let size = calibration.joint.as_ref().and_then(|joint| joint.size.clone()).expect("the robot moved");
+            let said = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale);
+            if let Some(estimate) = said.and_then(|h| h.estimate) {
+                told_of_size += 1;
+                assert_eq!((estimate.value, estimate.sigma), (size.scale, Some(size.sigma)), "{mode:?} {seed}");
+            }
+            let is_accused = diagnosis.findings.iter().any(|finding| finding.code == FindingCode::WrongScale);
+            assert_eq!(is_accused, scale > 0.0, "{mode:?} {seed}: {size:?} {said:?}");
+            assert!((size.scale - 1.0 - scale).abs() < 5.0 * size.sigma + 1e-4, "{mode:?} {seed}: {size:?}");
+            // Of a size that is wrong and not in the answer the error counts how far it moves it.
+            assert_eq!(calibration.moved_m().is_some(), scale > 0.0, "{mode:?} {seed}: {:?}", calibration.claim);
+        }
+    }
+    assert!(told_of_size >= 6, "nothing is compared: {told_of_size}");
+}
+
+#[test]
+fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_a_wrong_one() {
+    let cancel = CancelToken::default();
+    let (mut open, mut covered, mut covered_before) = (0, 0, 0);
+    for seed in 0..12 {
+        // Two centimetres and a degree a metre, one way or the other.
+        let per_metre = SMatrix::from_fn(|i, j| if (i + 2 * j + seed as usize).is_multiple_of(3) { 0.02 } else { -0.014 });
+        let noisy = Setup {
+            robot_m: 1.5e-3,
+            robot_rad: 3e-3,
+            arm_error: ArmError::Affine(per_metre),
+            tilt_deg: 15.0,
+            ..Setup::new(Mode::EyeInHand, 14, 950 + seed)
+        };
+        let observations = session(&noisy.with(Fault { scale: 0.03, ..Fault::default() }));
+        let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("solves");
+        diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+        let joint = calibration.joint.as_ref().expect("a joint estimate");
+        if joint.open_size().is_none() {
+            continue;
+        }
+        let point = joint.reference_point;
+        let truth = faulty::links(Mode::EyeInHand).0;
+        let found = calibration.hand_eye.expect("solved").mount_from_camera();
+        let off_m = (found.isometry() * point - truth.isometry() * point).norm();
+        open += 1;
+        covered += usize::from(calibration.tip_error_95_m().is_some_and(|stated_m| off_m <= stated_m));
+        covered_before += usize::from(calibration.modelled_error_95_m().is_some_and(|stated_m| off_m <= stated_m));
+    }
+    println!("size open in {open} of 12, error covered in {covered}, by the noise alone in {covered_before}");
+    assert!(open >= 3 && covered >= open - 1 && covered_before < covered, "{open} {covered} {covered_before}");
 }
 
 /// What the answer is off by is what lies between it and the explanation, not between two fits of the linear model, of which

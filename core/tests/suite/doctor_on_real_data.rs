@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
+use handeye_core::diagnose::doctor::{Detail, Diagnosis, diagnose};
 use handeye_core::diagnose::findings::{FindingCode, FindingOptions, Severity};
 use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
 use handeye_core::geometry::camera::Distortion;
@@ -62,7 +62,7 @@ fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
     let cancel = CancelToken::default();
     let mut calibration = calibrate(&observations, Method::Joint, &cancel).ok();
     let diagnosis = diagnose(&observations, calibration.as_mut(), &FindingOptions::default(), &cancel);
-    println!("{name}\n{}", diagnosis.report());
+    println!("{name}\n{}", diagnosis.report(Detail::All));
     diagnosis
 }
 

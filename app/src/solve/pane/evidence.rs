@@ -1,6 +1,7 @@
 //! The numbers behind a finding in one line.
 
 use handeye_core::diagnose::findings::{Evidence, Finding};
+use handeye_core::wording::decimals;
 
 use crate::gui::style::numbers;
 use crate::text::Language;
@@ -14,7 +15,7 @@ pub fn line(finding: &Finding, language: Language) -> String {
 fn stated(evidence: &Evidence, language: Language) -> String {
     let Evidence { name, value, unit } = *evidence;
     let is_count = unit.is_empty() && value.fract() == 0.0;
-    let value = numbers::fixed(value, if is_count { 0 } else { 3 }, 0);
+    let value = numbers::fixed(value, if is_count { 0 } else { decimals(value, 3) }, 0);
     let gap = if unit.is_empty() || unit == "°" { "" } else { " " };
     format!("{} {value}{gap}{unit}", called(name, language))
 }

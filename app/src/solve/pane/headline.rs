@@ -5,6 +5,7 @@ use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichTex
 use crate::command::{Command, Outbox};
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::{Model, Solved};
+use crate::report::in_parts;
 use crate::{text, tr};
 
 /// Size of the number.
@@ -49,13 +50,13 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
                 (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),
             };
             ui.add(Label::new(RichText::new(meaning).color(palette.weak)).wrap());
-            let estimate = solved.result.estimate.as_ref();
-            let moved = estimate.and_then(|estimate| estimate.moved_mm.zip(estimate.modelled_error_95_mm));
-            if let Some((moved_mm, modelled_mm)) = moved {
+            let moved_mm = solved.result.estimate.as_ref().and_then(|estimate| estimate.moved_mm);
+            if let Some((error_mm, moved_mm)) = error_mm.zip(moved_mm) {
+                let (moved, rest) = in_parts(error_mm, moved_mm);
                 let words = text!(
-                    "What was found below would move the answer by {moved} mm; the noise alone makes {modelled} mm.",
-                    moved = format!("{moved_mm:.3}"),
-                    modelled = format!("{modelled_mm:.3}")
+                    "What was found below would move the answer by {moved} mm, which is known to {rest} mm.",
+                    moved = moved,
+                    rest = rest
                 );
                 ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(Tone::Warning))).wrap());
             }

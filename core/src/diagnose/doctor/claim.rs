@@ -2,13 +2,15 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::Hypothesis;
 use super::effect::Effect;
 use super::judge::Judged;
 use super::model::{Fit, State};
 use super::screen::Candidate;
 use super::select::Selection;
+use crate::diagnose::findings::FindingCode;
 use crate::estimate::claim::{Alternative, Claim};
-use crate::estimate::{Calibration, ViewStatus};
+use crate::estimate::{Calibration, JointFit, ViewStatus};
 use crate::geometry::frames::{Camera, Mount, Pose};
 use crate::geometry::se3;
 
@@ -25,17 +27,20 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
     let out: Vec<usize> =
         (0..model.sight.views.len()).filter(|i| is_out(calibration, &model.sight.views[*i].name)).collect();
     let mut with = State { effects: Vec::new(), aside: out };
-    let mut missed = false;
+    let (mut missed, mut missed_more_than_size) = (false, false);
     for judged in &selection.taken {
         match &judged.candidate {
             Candidate::Effect(effect) => {
                 with.effects.push(*effect);
                 // What is too small to be reported moves no claim: nobody could mend it.
-                missed |= !counted(*effect) && judged.matters;
+                let is_missed = !counted(*effect) && judged.matters;
+                missed |= is_missed;
+                missed_more_than_size |= is_missed && *effect != Effect::Scale;
             }
             Candidate::Views(views) => {
                 let more: Vec<usize> = views.iter().copied().filter(|i| !with.aside.contains(i)).collect();
                 missed |= !more.is_empty();
+                missed_more_than_size |= !more.is_empty();
                 with.aside.extend(more);
             }
         }
@@ -49,7 +54,10 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
     let Some(answer) = &calibration.hand_eye else { return Claim::Nothing };
     let to = |fit: &Fit| alternative(&answer.mount_from_camera(), &model.solution.mount_from_camera, fit);
     let mut alternatives = Vec::new();
-    if missed {
+    let size = calibration.joint.as_ref().and_then(|joint| joint.size.as_ref());
+    if let Some(size) = size.filter(|_| missed && !missed_more_than_size) {
+        alternatives.push(size.with.clone());
+    } else if missed {
         // With so much left out nothing determines the answer.
         let Some(fit) = model.fit(&with, selection.fit.levels) else { return Claim::Nothing };
         alternatives.push(to(&fit));
@@ -61,11 +69,27 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
 /// What may be stated where sessions share a lens and have several: the answer may be off by what its own would move it.
 pub(super) fn with_own_lens(claim: Claim, calibration: &Calibration) -> Claim {
     let shared = calibration.shared_lens.as_ref().filter(|shared| shared.has_others());
-    let Some(own) = shared.map(|shared| shared.with_own_lens.clone()) else { return claim };
+    match shared {
+        Some(shared) => also(claim, shared.with_own_lens.clone()),
+        None => claim,
+    }
+}
+
+/// What may be stated where the robot's field leaves the size of the target open: a size that is off as prints and rulers are would
+/// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it.
+pub(super) fn with_open_size(claim: Claim, calibration: &Calibration) -> Claim {
+    let size = calibration.joint.as_ref().and_then(JointFit::open_size);
+    match size {
+        Some(size) => also(claim, size.with.clone()),
+        None => claim,
+    }
+}
+
+fn also(claim: Claim, alternative: Alternative) -> Claim {
     match claim {
         Claim::Nothing => Claim::Nothing,
-        Claim::AsModelled => Claim::Moved(vec![own]),
-        Claim::Moved(alternatives) => Claim::Moved(alternatives.into_iter().chain([own]).collect()),
+        Claim::AsModelled => Claim::Moved(vec![alternative]),
+        Claim::Moved(alternatives) => Claim::Moved(alternatives.into_iter().chain([alternative]).collect()),
     }
 }
 
@@ -79,6 +103,17 @@ fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
         Effect::Scale => joint.free.scale,
         Effect::Joint(_) => joint.joint_offsets.as_ref().is_some_and(|offsets| offsets.accepted),
         Effect::Lens | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
+    }
+}
+
+/// Whether the answer counts on what a hypothesis says.
+pub(super) fn is_applied(calibration: &Calibration, hypothesis: &Hypothesis) -> bool {
+    match hypothesis.code {
+        FindingCode::BoardBent => counts_on(calibration, Effect::Warp),
+        FindingCode::WrongScale => counts_on(calibration, Effect::Scale),
+        FindingCode::JointOffset => counts_on(calibration, Effect::Joint(0)),
+        FindingCode::OutlierView => hypothesis.views.iter().all(|name| is_out(calibration, name)),
+        _ => false,
     }
 }
 

@@ -6,19 +6,17 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
 use super::screen::{Candidate, view_score};
+use crate::estimate::size::FALSE_ALARM as ALPHA;
 use crate::estimate::uncertainty::quality::BY_CHANCE;
 use crate::geometry::statistics::{better_by_chance, outliers};
 
-/// Probability of a false alarm per hypothesis, after allowance for the alternatives among which the best was picked.
-/// One in ten thousand, because noise of real robots has longer tails than a Gaussian.
-const ALPHA: f64 = 1e-4;
 /// Parts that views are left out in, one at a time; as for the held-out error of a calibration.
 const FOLDS: usize = 5;
 /// Two explanations count as equally good when the noise that they leave the robot, position times orientation, differs by
 /// less than this factor: it is known to a quarter or so in a session of ten views.
 const AS_GOOD: f64 = 1.5;
 /// Size below which a hypothesis, however certain, is left alone: a print is true to a few parts in a thousand.
-const LEAST_SCALE: f64 = 3e-3;
+pub(super) const LEAST_SCALE: f64 = 3e-3;
 /// Deflection over the length of the board: a sheet on a flat plate keeps below it.
 const LEAST_WARP: f64 = 2e-3;
 /// Relative error of a focal length.

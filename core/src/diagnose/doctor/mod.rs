@@ -40,6 +40,8 @@ use crate::progress::Work;
 use crate::targets::observation;
 use crate::wording::Text;
 
+pub use report::Detail;
+
 /// A hypothesis about the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Hypothesis {
@@ -68,6 +70,8 @@ pub struct Hypothesis {
     /// Whether it is also large enough to matter, better on views held out, and not explained by one that explains more.
     /// It is then among the findings.
     pub accepted: bool,
+    /// Whether the calibration counts on it: a bend or a size that was estimated, views that are left out.
+    pub applied: bool,
 }
 
 impl Hypothesis {
@@ -108,8 +112,8 @@ impl Diagnosis {
     }
 
     /// The diagnosis as a page of text. It ends with a newline.
-    pub fn report(&self) -> String {
-        report::text(self)
+    pub fn report(&self, detail: Detail) -> String {
+        report::text(self, detail)
     }
 }
 
@@ -140,7 +144,8 @@ pub fn diagnose<'a>(
         diagnosis.untested = Some(why);
     }
     if let Some(calibration) = calibration.as_deref_mut() {
-        calibration.claim = claim::with_own_lens(std::mem::take(&mut calibration.claim), calibration);
+        let claim = std::mem::take(&mut calibration.claim);
+        calibration.claim = claim::with_open_size(claim::with_own_lens(claim, calibration), calibration);
     }
     if let Some(calibration) = calibration.as_deref_mut()
         && diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem)
@@ -214,14 +219,28 @@ fn examine(
     let selection = select::select(&sight, &start, work).ok_or_else(|| {
         if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }
     })?;
+    let size = calibration.as_deref().and_then(|calibration| calibration.joint.as_ref()?.size.as_ref());
+    let selection = match size {
+        Some(size) => selection.with_size(size),
+        None => selection,
+    };
+    let mut fine = words::fine(&selection);
+    if let Some(calibration) = calibration.as_deref() {
+        fine.iter_mut().for_each(|h| h.applied = claim::is_applied(calibration, h));
+    }
+    let noise = calibration.as_deref().and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
     if let Some(calibration) = calibration {
         calibration.claim = claim::claim(&selection, calibration);
     }
-    let fine = words::fine(&selection);
     diagnosis.findings.extend(fine.iter().filter(|h| h.accepted).map(words::finding_of));
-    let (robot_m, robot_rad) = selection.fit.robot_sigma();
+    let beside = fine.iter().any(|h| h.accepted && !h.applied);
+    // Where nothing else was found that is the noise that the answer states: one report has one number for it.
+    let (robot_m, robot_rad) = match noise.filter(|_| !beside) {
+        Some(noise) => (noise.robot_m, noise.robot_rad),
+        None => selection.fit.robot_sigma(),
+    };
     if robot_m > PLAUSIBLE.0 || robot_rad > PLAUSIBLE.1 {
-        diagnosis.findings.push(words::implausible(robot_m, robot_rad, fine.iter().any(|h| h.accepted)));
+        diagnosis.findings.push(words::implausible(robot_m, robot_rad, beside));
     }
     // What was not accepted is listed by its weight.
     let gross = std::mem::take(&mut diagnosis.hypotheses);

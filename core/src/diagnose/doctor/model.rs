@@ -24,14 +24,17 @@ use super::views::SessionViews;
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::joint::chain::Chain;
 use crate::estimate::handeye::joint::field::{self, HALF, Places, SLOPES};
+use crate::estimate::resolution;
 use crate::geometry::se3;
 use crate::geometry::statistics::pooled_freedom;
 
 /// Parts of the field, each with a level: errors of position and of orientation in the axes of the tip, and in those of the
 /// base.
 const PARTS: usize = 4;
-/// Smallest noise level of the robot, m and rad: below it nothing changes now.
-const LEAST: f64 = 1e-6;
+/// Smallest noise levels of the robot, m and rad: nothing is judged by less.
+const LEAST: [f64; 2] = [resolution::PLACE_M, resolution::ANGLE_RAD];
+/// Smallest levels of the field, m and rad: below it nothing changes now.
+const LEAST_FIELD: f64 = 1e-6;
 /// Largest change of a variance in one step, as a logarithm.
 const LARGEST_STEP: f64 = 2.0;
 const MAX_STEPS: usize = 25;
@@ -265,8 +268,11 @@ impl<'a> Model<'a> {
             return None;
         }
         let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
-        let floor = |v: f64| v.max(LEAST * LEAST);
-        let mut levels = Levels { noise: start.noise.map(floor), field: start.field.map(floor) };
+        let least: [f64; 2 + PARTS] = std::array::from_fn(|k| LEAST.get(k).copied().unwrap_or(LEAST_FIELD).powi(2));
+        let mut levels = Levels {
+            noise: std::array::from_fn(|k| start.noise[k].max(least[k])),
+            field: std::array::from_fn(|k| start.field[k].max(least[LEAST.len() + k])),
+        };
         for step in 0..=MAX_STEPS {
             self.count_work(width);
             let solved = self.solve(state, &inside, &designs, levels)?;
@@ -276,9 +282,10 @@ impl<'a> Model<'a> {
             let of_noise = self.scoring(&inside, &designs, &solved, levels.noise);
             let of_field = self.scoring_of_field(&solved, levels.field);
             let mut settled = true;
-            for (v, c) in levels.noise.iter_mut().chain(&mut levels.field).zip(of_noise.into_iter().chain(of_field)) {
-                settled &= c.abs() < SETTLED || (c < 0.0 && *v <= LEAST * LEAST);
-                *v = floor(*v * c.exp());
+            let changes = of_noise.into_iter().chain(of_field);
+            for ((v, least), c) in levels.noise.iter_mut().chain(&mut levels.field).zip(least).zip(changes) {
+                settled &= c.abs() < SETTLED || (c < 0.0 && *v <= least);
+                *v = (*v * c.exp()).max(least);
             }
             if settled {
                 return Some(self.finished(solved, levels, designs, &inside));

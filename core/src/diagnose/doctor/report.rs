@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Diagnosis, Hypothesis};
-use crate::diagnose::findings::{Finding, Severity};
+use crate::diagnose::findings::{Finding, FindingCode, Severity};
 use crate::wording::English;
 
 /// Writing into a `String` cannot fail.
@@ -13,7 +13,16 @@ macro_rules! line {
     }};
 }
 
-pub fn text(diagnosis: &Diagnosis) -> String {
+/// How much of a diagnosis a page says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detail {
+    /// What was found, and in a line what was checked and found fine.
+    Found,
+    /// And every hypothesis with what it explains.
+    All,
+}
+
+pub fn text(diagnosis: &Diagnosis, detail: Detail) -> String {
     let mut out = String::new();
     let grave = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning).count();
     match (grave, &diagnosis.untested) {
@@ -28,8 +37,20 @@ pub fn text(diagnosis: &Diagnosis) -> String {
     if let Some(why) = &diagnosis.untested {
         line!(out, "hypotheses were not tested: {why}");
     }
-    if !diagnosis.hypotheses.is_empty() {
-        line!(out, "hypotheses, none of them applied");
+    let said = |code: FindingCode| diagnosis.findings.iter().any(|finding| finding.code == code);
+    let (minor, fine): (Vec<&Hypothesis>, Vec<&Hypothesis>) =
+        diagnosis.hypotheses.iter().filter(|h| !h.accepted && !said(h.code)).partition(|h| h.significant);
+    for (what, hypotheses) in
+        [("seen, but too small to matter or explained by what was found", minor), ("checked and found fine", fine)]
+    {
+        let mut names: Vec<&str> = hypotheses.iter().map(|h| checked(h.code)).collect();
+        names.dedup();
+        if !names.is_empty() {
+            line!(out, "{what}: {}", names.join(", "));
+        }
+    }
+    if detail == Detail::All && !diagnosis.hypotheses.is_empty() {
+        line!(out, "hypotheses");
         for (number, h) in diagnosis.hypotheses.iter().enumerate() {
             hypothesis(&mut out, number + 1, h);
         }
@@ -48,16 +69,39 @@ fn finding(out: &mut String, finding: &Finding) {
 }
 
 fn hypothesis(out: &mut String, number: usize, h: &Hypothesis) {
-    let verdict = match (h.accepted, h.significant) {
-        (true, _) => "accepted",
-        (false, true) => "significant, but too small or explained by another",
-        (false, false) => "not supported",
+    let verdict = match (h.accepted, h.significant, h.applied) {
+        (true, _, true) => "accepted, and in the answer",
+        (true, _, false) => "accepted, and not in the answer",
+        (false, true, true) => "too small to be reported, and in the answer",
+        (false, true, false) => "significant, but too small or explained by another",
+        (false, false, _) => "not supported",
     };
     line!(out, "  {number}. [{}] {verdict}: {}", code(h.code), h.text.say(English));
 }
 
+/// What a hypothesis is about, for a list of what was looked at.
+fn checked(code: FindingCode) -> &'static str {
+    use FindingCode as C;
+    match code {
+        C::InvertedPoses => "direction of the robot poses",
+        C::InvertedTargetPoses => "direction of the target poses",
+        C::WrongMode => "mode",
+        C::WrongQuaternionOrder => "order of quaternions",
+        C::WrongLengthUnit => "unit of lengths",
+        C::ShiftedPoses => "pairing of images and poses",
+        C::WrongScale => "size of the target",
+        C::BoardBent => "shape of the target",
+        C::WrongIntrinsics => "intrinsics",
+        C::BoardMoved => "place of the target",
+        C::CameraMoved => "place of the camera",
+        C::JointOffset => "zeros of the joints",
+        C::OutlierView => "single views",
+        _ => "other causes",
+    }
+}
+
 /// The code as it stands in JSON.
-fn code(code: crate::diagnose::findings::FindingCode) -> String {
+fn code(code: FindingCode) -> String {
     // A unit variant is always a string.
     serde_json::to_value(code).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }

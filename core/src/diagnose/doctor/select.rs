@@ -2,10 +2,12 @@
 //! judged anew beside it.
 
 use super::agreement::Agreement;
-use super::judge::{Judged, alternatives, confirm, is_significant, judge};
+use super::effect::Effect;
+use super::judge::{Judged, LEAST_SCALE, alternatives, confirm, is_significant, judge};
 use super::model::{Fit, Levels, Model, State};
 use super::screen::{Candidate, screened};
 use super::views::SessionViews;
+use crate::estimate::TargetSize;
 use crate::estimate::handeye::joint::field::Places;
 use crate::progress::Work;
 
@@ -104,6 +106,22 @@ pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work
         }
     }
     Some(Selection { taken, others, model, fit, is_ended })
+}
+
+impl Selection<'_> {
+    /// Takes the size of the target from the joint estimate, which has bend, field and lens beside it and every corner: poses
+    /// measured by a flat board, and a size that is linear in them, are wrong about it where the board is bent. What that does
+    /// not show stays in the model and is not reported.
+    pub fn with_size(mut self, size: &TargetSize) -> Self {
+        let is_scale = |j: &&mut Judged| j.candidate == Candidate::Effect(Effect::Scale);
+        for judged in self.taken.iter_mut().chain(&mut self.others).filter(is_scale) {
+            (judged.numbers, judged.sigma) = (vec![size.scale - 1.0], vec![size.sigma]);
+            judged.significant &= size.is_another();
+            judged.matters = judged.significant && (size.scale - 1.0).abs() >= LEAST_SCALE;
+            judged.as_good &= judged.matters;
+        }
+        self
+    }
 }
 
 fn same_kind(a: &Candidate, b: &Candidate) -> bool {

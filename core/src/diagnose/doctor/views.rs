@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::{Mode, subset};
 use crate::estimate::intrinsics::{self, Options, SeenView};
-use crate::estimate::{CameraKnowledge, Observations, ObservedView};
+use crate::estimate::{CameraKnowledge, Observations, ObservedView, resolution};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::planar_pose::{self, PlanarPose};
@@ -199,8 +199,8 @@ impl SessionViews {
         let Some(typical) = median(variances) else {
             return Err("the target's pose could not be found in any view".to_owned());
         };
-        // Exact corners would have a weight that is not finite.
-        let typical = typical.max(1e-12);
+        // Nothing is judged by less.
+        let typical = typical.max(resolution::CORNER_PX.powi(2));
         self.corner_px = Some(typical.sqrt());
         self.form_information = DMatrix::zeros(count, count);
         self.form_gradient = DVector::zeros(count);
@@ -231,7 +231,7 @@ impl SessionViews {
                 base_from_tip,
                 camera_from_target: pose,
                 alternative: possible.map(|a| *a.camera_from_target.isometry()),
-                covariance: inverse * variance,
+                covariance: inverse * resolution::pose_variance_px2(variance, fit.corners.len()),
                 by_form: DMatrix::from_iterator(6, count, by_form.iter().copied()),
                 tip_by_joint: view.tip_by_joint.clone(),
                 wrong_corners: fit.wrong,

@@ -4,10 +4,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
 use crate::estimate::claim::Claim;
-use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus};
+use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus, resolution};
 use crate::geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median};
 use crate::text;
-use crate::wording::Text;
+use crate::wording::{Text, shown};
 
 /// Views below which none can stand out from the others.
 const MIN_FOR_OUTLIERS: usize = 5;
@@ -64,15 +64,15 @@ fn stands_out<'a>(
 fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
     let error_m = calibration.tip_error_95_m()?;
     let (view, largest_m, median_m) = stands_out(used, |v| v.influence_m)?;
-    if largest_m < INFLUENCE * error_m {
+    if largest_m < (INFLUENCE * error_m).max(resolution::PLACE_M) {
         return None;
     }
     let text = text!(
         "View {view} alone moves the answer by {influence} mm; the median view moves it by {median} mm. Check its image \
          and its robot pose, or add views like it so that it does not stand alone.",
         view = &view.name,
-        influence = format!("{:.2}", largest_m * 1e3),
-        median = format!("{:.2}", median_m * 1e3)
+        influence = shown(largest_m * 1e3, 2),
+        median = shown(median_m * 1e3, 2)
     );
     // Where a view stands alone is geometry; one that is wrong is told by what it contradicts.
     let finding = Finding::new(FindingCode::InfluentialView, Severity::Advice, text).of_view(&view.name);
@@ -82,12 +82,15 @@ fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding>
 
 fn residuals(used: &[&ViewResult]) -> Option<Finding> {
     let (view, largest, middle) = stands_out(used, |v| v.rms_px)?;
+    if largest < resolution::FINE_PX {
+        return None;
+    }
     let text = text!(
         "The corners of view {view} fit with {rms} px, those of the median view with {median} px. Look at its image for \
          blur, reflections and wrong corners; leave it out if there are any.",
         view = &view.name,
-        rms = format!("{largest:.2}"),
-        median = format!("{middle:.2}")
+        rms = shown(largest, 2),
+        median = shown(middle, 2)
     );
     let finding = Finding::new(FindingCode::LargeResidual, Severity::Warning, text).of_view(&view.name);
     Some(finding.with("rms", largest, "px").with("median_rms", middle, "px"))
@@ -101,7 +104,7 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
         [by_distance, by_angle].into_iter().flatten().max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;
     // Views tell their corrections unequally well, so the median alone is no measure: the noise level must be left too.
     // One view that makes up all of the noise has at most the root of six times the views.
-    let noise = calibration.joint.as_ref()?.noise;
+    let noise = resolution::judged_by(&calibration.joint.as_ref()?.noise);
     let over_noise = (view.correction_m? / noise.robot_m).hypot(view.correction_rad? / noise.robot_rad);
     if over_noise < CORRECTION_SIGMAS.min(0.75 * (6.0 * used.len() as f64).sqrt()) {
         return None;
@@ -114,10 +117,10 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
          {median_deg}°. The arm may have moved when the image was taken, or the board has; leave the view out or capture \
          it again.",
         view = &view.name,
-        mm = format!("{mm:.2}"),
-        deg = format!("{deg:.3}"),
-        median_mm = format!("{median_mm:.2}"),
-        median_deg = format!("{median_deg:.3}")
+        mm = shown(mm, 2),
+        deg = shown(deg, 3),
+        median_mm = shown(median_mm, 2),
+        median_deg = shown(median_deg, 3)
     );
     let finding = Finding::new(FindingCode::LargeCorrection, Severity::Warning, text).of_view(&view.name);
     let finding = finding.with("correction", mm, "mm").with("correction_angle", deg, "°");
@@ -127,15 +130,15 @@ fn corrections(calibration: &Calibration, used: &[&ViewResult]) -> Option<Findin
 fn prediction(calibration: &Calibration) -> Option<Finding> {
     let joint = calibration.joint.as_ref()?;
     let (heldout, expected) = (joint.heldout_rms_px?, joint.expected_heldout_rms_px);
-    if heldout <= PREDICTION * expected {
+    if heldout <= (PREDICTION * expected).max(resolution::FINE_PX) {
         return None;
     }
     let text = text!(
         "Views left out of the fit are predicted to {heldout} px, where robot and corner noise explain {expected} px. The \
          model misses something: a wrong view, a board that is bent or not of the stated size, too few views for so many \
          unknowns, or robot errors that depend on the pose. Capture more views and check those that stand out.",
-        heldout = format!("{heldout:.2}"),
-        expected = format!("{expected:.2}")
+        heldout = shown(heldout, 2),
+        expected = shown(expected, 2)
     );
     let finding = Finding::new(FindingCode::PoorPrediction, Severity::Warning, text);
     Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
@@ -157,6 +160,9 @@ fn lens_folds(calibration: &Calibration) -> Option<Finding> {
 fn robot_field(calibration: &Calibration) -> Option<Finding> {
     let joint = calibration.joint.as_ref()?;
     joint.field.as_ref()?;
+    if !resolution::is_resolved(joint.noise.field_m, joint.noise.field_rad) {
+        return None;
+    }
     let (mm, deg) = (joint.noise.field_m * 1e3, joint.noise.field_rad.to_degrees());
     let (without, with) = (joint.heldout_links_rms_px?, joint.heldout_rms_px?);
     let text = text!(
@@ -164,43 +170,59 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
          the session. The answer and its expected error count on them. The result has them as an optional correction of \
          reported poses, which brings views left out of the fit from {without} px to {with} px; a kinematic calibration of \
          the arm removes their cause.",
-        mm = format!("{mm:.2}"),
-        deg = format!("{deg:.3}"),
-        without = format!("{without:.2}"),
-        with = format!("{with:.2}")
+        mm = shown(mm, 2),
+        deg = shown(deg, 3),
+        without = shown(without, 2),
+        with = shown(with, 2)
     );
+    let text = match joint.open_size() {
+        Some(size) => Text::sentences([
+            text,
+            text!(
+                "Another size of the target would look the same: by the robot's motion it is {size} ± {sigma} times the stated one, so \
+                 that a wrong size would not be noticed, and the expected error counts on it. Measure the target over as many squares \
+                 as it has, and take views from more different distances.",
+                size = shown(size.scale, 3),
+                sigma = shown(size.sigma, 3)
+            ),
+        ]),
+        None => text,
+    };
     let finding = Finding::new(FindingCode::RobotField, Severity::Advice, text);
     let finding = finding.with("field_sigma", mm, "mm").with("field_sigma_angle", deg, "°");
     Some(finding.with("heldout_rms", without, "px").with("heldout_rms_corrected", with, "px"))
 }
 
 fn residual_distortion(calibration: &Calibration) -> Option<Finding> {
-    let shown = calibration.joint.as_ref()?.residual_distortion.as_ref()?;
+    let found = calibration.joint.as_ref()?.residual_distortion.as_ref()?;
+    if found.rms_px < resolution::CORNER_PX {
+        return None;
+    }
     let text = text!(
         "The lens does more than its model: corners are displaced by {px} px RMS, smoothly with their place in the image. The \
          answer and its expected error count on it, and the result has it as an optional correction of image points. A lens \
          model with more coefficients may follow the lens further; views that cover the whole image show how it goes on.",
-        px = format!("{:.3}", shown.rms_px)
+        px = shown(found.rms_px, 3)
     );
     let finding = Finding::new(FindingCode::ResidualDistortion, Severity::Advice, text);
-    Some(finding.with("displacement_rms", shown.rms_px, "px").with("log_likelihood_gain", 0.5 * shown.gain, ""))
+    Some(finding.with("displacement_rms", found.rms_px, "px").with("log_likelihood_gain", 0.5 * found.gain, ""))
 }
 
 fn robot_noise(calibration: &Calibration) -> Option<Finding> {
     let JointFit { noise, robot_effect_px: robot_px, .. } = *calibration.joint.as_ref()?;
     // Both as 2-D distances.
     let corner_px = noise.corner_px * std::f64::consts::SQRT_2;
-    if robot_px < ROBOT_OVER_CORNERS * corner_px {
+    if robot_px < ROBOT_OVER_CORNERS * corner_px || !resolution::is_resolved(noise.robot_m, noise.robot_rad) {
         return None;
     }
     let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
     let text = text!(
         "The robot limits the answer: its noise of {mm} mm and {deg}° per axis moves corners by {robot} px, their own noise \
          is {corner} px. Better images will not help much; more views, and settling longer before each, will.",
-        mm = format!("{mm:.3}"),
-        deg = format!("{deg:.3}"),
-        robot = format!("{robot_px:.2}"),
-        corner = format!("{corner_px:.2}")
+        mm = shown(mm, 3),
+        deg = shown(deg, 3),
+        robot = shown(robot_px, 2),
+        corner = shown(corner_px, 2)
     );
     let finding = Finding::new(FindingCode::RobotNoise, Severity::Info, text);
     let finding = finding.with("robot_effect", robot_px, "px").with("corner_noise", corner_px, "px");
@@ -227,9 +249,8 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     off.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let each = off
-        .iter()
-        .map(|(name, d)| text!("{method} by {distance} mm", method = name, distance = format!("{:.1}", d * 1e3)));
+    let each =
+        off.iter().map(|(name, d)| text!("{method} by {distance} mm", method = name, distance = shown(d * 1e3, 1)));
     let (severity, advice) = if typical_m > DISAGREE_M {
         (
             Severity::Warning,
@@ -255,8 +276,8 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
         let text = text!(
             "Good enough: the expected error of {error} mm (95 %) is below the goal of {goal} mm. Verify with captures that \
              were not in the fit.",
-            error = format!("{error_mm:.3}"),
-            goal = format!("{goal_mm:.3}")
+            error = shown(error_mm, 3),
+            goal = shown(goal_mm, 3)
         );
         return Some(finding(FindingCode::GoalReached, Severity::Info, text));
     }
@@ -265,8 +286,8 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let not_reached = |advice: Text| {
         let text = text!(
             "The expected error of {error} mm (95 %) is above the goal of {goal} mm. {advice}",
-            error = format!("{error_mm:.3}"),
-            goal = format!("{goal_mm:.3}"),
+            error = shown(error_mm, 3),
+            goal = shown(goal_mm, 3),
             advice = advice
         );
         finding(FindingCode::GoalNotReached, Severity::Advice, text)

@@ -11,7 +11,7 @@ use super::{Finding, FindingCode, Severity};
 use crate::estimate::Calibration;
 use crate::geometry::se3::skew;
 use crate::text;
-use crate::wording::Text;
+use crate::wording::{Text, shown};
 
 /// Weakest over best from which a word is worth it: views on a wide cone leave a factor of three or four.
 const UNEVEN: f64 = 5.0;
@@ -48,11 +48,7 @@ pub fn finding(calibration: &Calibration) -> Option<Finding> {
         let sigma_deg = (sigma_m * turn.norm() / distance_m).to_degrees();
         (
             text!("the camera's turn about {axis}", axis = named(&axis)),
-            text!(
-                "±{deg}°, which is {mm} mm at the board",
-                deg = format!("{sigma_deg:.4}"),
-                mm = format!("{sigma_mm:.3}")
-            ),
+            text!("±{deg}°, which is {mm} mm at the board", deg = shown(sigma_deg, 4), mm = shown(sigma_mm, 3)),
         )
     } else {
         (

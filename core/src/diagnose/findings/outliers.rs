@@ -2,9 +2,9 @@
 //! bent target, a widened uncertainty, noise levels that cannot be told apart.
 
 use super::{Finding, FindingCode, Severity, listed};
-use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus};
+use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus, resolution};
 use crate::text;
-use crate::wording::Text;
+use crate::wording::{Text, shown};
 
 /// Relative standard deviation of a noise level above which it counts as not determined: where it is with a probability of
 /// 95 % the highest is then seven times the lowest, e^(4 · 0.5).
@@ -49,8 +49,8 @@ fn outliers(calibration: &Calibration) -> Option<Finding> {
         |d| {
             text!(
                 "the target is up to {mm} mm and {deg}° from where the other views put it",
-                mm = format!("{:.1}", d.metres * 1e3),
-                deg = format!("{:.2}", d.radians.to_degrees())
+                mm = shown(d.metres * 1e3, 1),
+                deg = shown(d.radians.to_degrees(), 2)
             )
         },
     );
@@ -112,10 +112,10 @@ fn bent(calibration: &Calibration) -> Option<Finding> {
     let text = text!(
         "The target is bent by {x} ± {x_sigma} mm along x and {y} ± {y_sigma} mm along y (middle against edges, one standard \
          deviation). The answer allows for it; fix the target to a flat plate for a better one.",
-        x = format!("{x:.2}"),
-        x_sigma = format!("{:.2}", sigma[0]),
-        y = format!("{y:.2}"),
-        y_sigma = format!("{:.2}", sigma[1])
+        x = shown(x, 2),
+        x_sigma = shown(sigma[0], 2),
+        y = shown(y, 2),
+        y_sigma = shown(sigma[1], 2)
     );
     let finding = Finding::new(FindingCode::BoardBent, Severity::Advice, text);
     let finding = finding.with("warp_x", x, "mm").with("warp_x_sigma", sigma[0], "mm");
@@ -132,7 +132,7 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
     let text = text!(
         "The stated uncertainty is {times} times what independent noise explains, because {why}. It counts what the data \
          show; more poses in other places of the workspace help more than many in one.",
-        times = format!("{times:.1}"),
+        times = shown(times, 1),
         why = by.reason()
     );
     Some(Finding::new(FindingCode::UncertaintyWidened, Severity::Info, text).with("times", times, ""))
@@ -142,20 +142,26 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
 fn unclear(calibration: &Calibration) -> Option<Finding> {
     let JointFit { small_sample: sample, noise, robot_effect_px: robot_px, .. } = *calibration.joint.as_ref()?;
     let [_, position, orientation] = sample.level_sigma;
-    let [_, mm, deg] = sample.level_range;
-    let (mm, deg) = (mm.map(|m| m * 1e3), deg.map(f64::to_degrees));
+    let [_, [m_low, m_high], [rad_low, rad_high]] = sample.level_range;
     let unclear = position.max(orientation);
-    if unclear < UNCLEAR || robot_px < NO_MATTER * noise.corner_px {
+    let is_fine = robot_px < NO_MATTER * noise.corner_px || !resolution::is_resolved(m_high, rad_high);
+    if unclear < UNCLEAR || is_fine {
         return None;
     }
+    let level = |low: f64, high: f64, least: f64, said: &dyn Fn(f64) -> String| {
+        // Below what a robot resolves there is nothing to tell from nothing.
+        if low < least {
+            text!("below {high}", high = said(high))
+        } else {
+            text!("between {low} and {high}", low = said(low), high = said(high))
+        }
+    };
     let text = text!(
-        "Robot and corner noise can hardly be told apart: the robot's noise per axis is between {mm_low} and {mm_high} mm and \
-         between {deg_low}° and {deg_high}° (95 %). The expected error allows for it. More views, or better images, tell them \
-         apart.",
-        mm_low = format!("{:.3}", mm[0]),
-        mm_high = format!("{:.3}", mm[1]),
-        deg_low = format!("{:.4}", deg[0]),
-        deg_high = format!("{:.4}", deg[1])
+        "Robot and corner noise can hardly be told apart: the robot's noise per axis is {position} and {orientation} (95 %). The \
+         expected error allows for it. More views, or better images, tell them apart.",
+        position = level(m_low, m_high, resolution::PLACE_M, &|m| format!("{} mm", shown(m * 1e3, 3))),
+        orientation =
+            level(rad_low, rad_high, resolution::ANGLE_RAD, &|rad| format!("{}°", shown(rad.to_degrees(), 4)))
     );
     let finding = Finding::new(FindingCode::NoiseUnclear, Severity::Info, text);
     Some(finding.with("position", position * 100.0, "%").with("orientation", orientation * 100.0, "%"))

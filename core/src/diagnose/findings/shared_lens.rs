@@ -4,7 +4,7 @@ use super::{Finding, FindingCode, Severity};
 use crate::estimate::Calibration;
 use crate::estimate::shared_lens::OddSession;
 use crate::text;
-use crate::wording::Text;
+use crate::wording::{Text, shown};
 
 /// Sessions whose lens differs from that of the others: a warning where it is another one.
 pub fn finding(calibration: &Calibration) -> Option<Finding> {
@@ -14,10 +14,10 @@ pub fn finding(calibration: &Calibration) -> Option<Finding> {
         text!(
             "{session} (focal length {own} px by itself, {others} ± {sigma} px by the others; principal point {apart} px apart)",
             session = Text::verbatim(odd.name.clone()),
-            own = format!("{:.2}", odd.focal_px),
-            others = format!("{:.2}", odd.others_focal_px),
-            sigma = format!("{:.2}", odd.sigma_px),
-            apart = format!("{:.2}", odd.centre_apart_px)
+            own = shown(odd.focal_px, 2),
+            others = shown(odd.others_focal_px, 2),
+            sigma = shown(odd.sigma_px, 2),
+            apart = shown(odd.centre_apart_px, 2)
         )
     });
     let list = Text::list(each);

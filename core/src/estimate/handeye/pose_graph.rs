@@ -17,6 +17,7 @@ use super::closed_form::ClosedFormSolution;
 use super::motion::MIN_VIEWS;
 use super::screening::{Judged, limit};
 use super::{HandEyeError, PosePair};
+use crate::estimate::resolution;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::se3;
 
@@ -52,6 +53,15 @@ impl Levels {
     /// Disagreement in rotation, radians.
     pub fn rotation_rad(&self) -> f64 {
         self.target_rad.hypot(self.robot_rad)
+    }
+
+    /// None below what a robot resolves, see [`resolution`].
+    fn judged_by(self) -> Self {
+        Self {
+            position_m: self.position_m.max(resolution::PLACE_M),
+            target_rad: self.target_rad.max(resolution::ANGLE_RAD),
+            robot_rad: self.robot_rad.max(resolution::ANGLE_RAD),
+        }
     }
 
     /// What the covariance of a residual has of each level, at a level of 1.
@@ -93,7 +103,7 @@ impl PoseGraphSolution {
         let limit = limit(pairs.len(), freedom.max(4.0));
         let judged = pairs.iter().enumerate().map(|(index, pair)| {
             let (seen, predicted) = (self.in_metres(pair), self.predicted(pair));
-            let own = self.levels.covariance(&Levels::parts(&lever(pair, &self.anchor_from_target)));
+            let own = self.levels.judged_by().covariance(&Levels::parts(&lever(pair, &self.anchor_from_target)));
             let jacobian = jacobian(&seen, &predicted).fixed_columns::<12>(0).into_owned();
             let shared = jacobian * self.covariance * jacobian.transpose();
             let expected = if kept.binary_search(&index).is_ok() { own - shared } else { own + shared };

@@ -136,6 +136,10 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
         require(board.scale > 0.0, "estimate.board.scale", "must be positive")?;
         not_negative(board.scale_sigma, "estimate.board.scale_sigma")?;
     }
+    if let Some(size) = &estimate.target_size {
+        require(size.true_over_stated > 0.0, "estimate.target_size.true_over_stated", "must be positive")?;
+        not_negative(Some(size.sigma), "estimate.target_size.sigma")?;
+    }
     if let Some(field) = &estimate.robot_field {
         all_finite(&field.origin_m, "estimate.robot_field.origin_m")?;
         require(field.reach_m > 0.0, "estimate.robot_field.reach_m", "must be a positive length")?;

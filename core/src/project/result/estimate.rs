@@ -31,6 +31,9 @@ pub struct EstimateDetails {
     pub widening: Option<WideningRecord>,
     /// The target where it was found not to be the one drawn.
     pub board: Option<BoardEstimate>,
+    /// The size of the target by the robot's motion, which the answer does not count on unless `board` has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target_size: Option<TargetSizeEstimate>,
     /// Offsets of the robot's joints, when they were asked for.
     pub joint_offsets: Option<JointOffsetsEstimate>,
     /// Errors of the robot that depend on where it stands, where the data show them.
@@ -48,6 +51,17 @@ pub struct WideningRecord {
     pub factor: f64,
     /// Which evidence asked for it, or which was looked at in vain.
     pub by: String,
+}
+
+/// The size of the target by the robot's motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TargetSizeEstimate {
+    /// True size over stated size.
+    pub true_over_stated: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// Whether a size that is off by 3 %, as prints and rulers are, would be found.
+    pub determined: bool,
 }
 
 /// The target as found.

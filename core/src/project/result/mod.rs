@@ -23,7 +23,7 @@ use crate::plan::guided::record::GuidedRecord;
 pub use check::BadResult;
 pub use estimate::{
     BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, ResidualDistortionEstimate, RobotFieldEstimate,
-    WideningRecord,
+    TargetSizeEstimate, WideningRecord,
 };
 pub use file::{ResultError, ResultProblem};
 pub use of_calibration::{TARGET_OPTION, solve_options};
@@ -323,6 +323,9 @@ pub struct VerificationSummary {
     pub centre_rms_mm: f64,
     /// Root mean square angle of the target from how it is predicted, degrees.
     pub orientation_rms_deg: f64,
+    /// Whether these errors are no larger than the result states; `None` where it states none.
+    #[serde(default)]
+    pub as_stated: Option<bool>,
 }
 
 /// How far the result is from the truth of a simulated cell.

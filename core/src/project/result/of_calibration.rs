@@ -6,9 +6,9 @@ use nalgebra::Matrix3;
 
 use super::{
     BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, MethodRecord,
-    Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
+    Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate, ViewRecord,
+    ViewRecordStatus, WideningRecord,
 };
-use crate::estimate::claim::Claim;
 use crate::estimate::handeye::joint::{RobotField, ShownDistortion};
 use crate::estimate::uncertainty::widening::Evidence;
 use crate::estimate::{
@@ -76,7 +76,7 @@ impl Calibration {
     fn details(&self, joint: &JointFit) -> EstimateDetails {
         EstimateDetails {
             modelled_error_95_mm: self.modelled_error_95_m().map(|m| m * 1e3),
-            moved_mm: matches!(self.claim, Claim::Moved(_)).then(|| self.claim.moved_m(&joint.reference_point) * 1e3),
+            moved_mm: self.moved_m().map(|m| m * 1e3),
             reference_point_m: Some(joint.reference_point.coords.into()),
             degrees_of_freedom: Some(joint.small_sample.degrees_of_freedom).filter(|v| v.is_finite()),
             region_scale: Some(joint.small_sample.scale),
@@ -86,6 +86,11 @@ impl Calibration {
                 by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
             }),
             board: joint.shape.map(board),
+            target_size: joint.size.as_ref().map(|size| TargetSizeEstimate {
+                true_over_stated: size.scale,
+                sigma: size.sigma,
+                determined: size.is_determined(),
+            }),
             joint_offsets: joint.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
                 offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
                 sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),

@@ -53,6 +53,7 @@ pub(crate) fn golden() -> CalibrationResult {
         region_scale: Some(0.97),
         view_sigma_px: Some(0.0),
         widening: Some(WideningRecord { factor: 1.4, by: "neighbours".to_owned() }),
+        target_size: Some(TargetSizeEstimate { true_over_stated: 1.001, sigma: 0.002, determined: true }),
         board: Some(BoardEstimate {
             warp_mm: [0.16, -0.03],
             warp_sigma_mm: Some([0.01, 0.02]),
@@ -93,8 +94,13 @@ pub(crate) fn golden() -> CalibrationResult {
             unit: "px".to_owned(),
         }],
     }];
-    result.verification =
-        Some(VerificationSummary { captures: 3, rms_px: 0.25, centre_rms_mm: 0.125, orientation_rms_deg: 0.01 });
+    result.verification = Some(VerificationSummary {
+        captures: 3,
+        rms_px: 0.25,
+        centre_rms_mm: 0.125,
+        orientation_rms_deg: 0.01,
+        as_stated: Some(true),
+    });
     result.truth = Some(TruthComparison { translation_error_mm: Some(0.2), ..TruthComparison::default() });
     result.provenance.tool_version = "0.1.0".to_owned();
     result.provenance.input_sha256 = Some("00ff".repeat(16));

@@ -12,7 +12,7 @@ use super::{estimate, evidence};
 use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};
 use crate::estimate::handeye::Mode;
 use crate::text;
-use crate::wording::Text;
+use crate::wording::{Text, shown};
 
 /// A turn from which a view is likelier seen the wrong way round than moved, degrees: views numbered from the wrong end are off
 /// by half a turn or a quarter, and a board that is knocked turns by less. It chooses the words only.
@@ -74,8 +74,8 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             } else {
                 text!("The motion of the robot says that the target is {size} % ± {sigma} % larger than stated.")
             };
-            let size = format!("{:.2}", percent.abs());
-            let what = what.with("size", size).with("sigma", format!("{sigma:.2}"));
+            let size = shown(percent.abs(), 2);
+            let what = what.with("size", size).with("sigma", shown(sigma, 2));
             let scale = estimate("true_over_stated_size", 1.0 + number(0), Some(sigma / 100.0), "");
             numbers.push(evidence("true_over_stated_size", 1.0 + number(0), ""));
             numbers.push(evidence("true_over_stated_size_sigma", sigma / 100.0, ""));
@@ -86,8 +86,8 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             let [x_mm, y_mm] = [number(0) * 1e3, number(1) * 1e3];
             let what = text!(
                 "The target is bent: its middle stands {x} mm (along x) and {y} mm (along y) out.",
-                x = format!("{x_mm:.2}"),
-                y = format!("{y_mm:.2}")
+                x = shown(x_mm, 2),
+                y = shown(y_mm, 2)
             );
             numbers.push(evidence("warp_x", x_mm, "mm"));
             numbers.push(evidence("warp_y", y_mm, "mm"));
@@ -101,7 +101,7 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             let what = text!(
                 "The intrinsics given do not fit the images: the focal length would be {percent} % ± {sigma} % off.",
                 percent = format!("{percent:+.2}"),
-                sigma = format!("{:.2}", 100.0 * sigma(0) / fx)
+                sigma = shown(100.0 * sigma(0) / fx, 2)
             );
             numbers.push(evidence("focal_change", percent, "%"));
             let change = estimate("focal_change", percent, Some(100.0 * sigma(0) / fx), "%");
@@ -124,8 +124,8 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
                 "{who} moved before view {view}, by {mm} mm and {deg}°.",
                 who = who,
                 view = &name,
-                mm = format!("{mm:.2}"),
-                deg = format!("{deg:.3}")
+                mm = shown(mm, 2),
+                deg = shown(deg, 3)
             );
             numbers.push(evidence("first_view_after", from as f64, ""));
             numbers.push(evidence("moved", mm, "mm"));
@@ -142,7 +142,7 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
                 "The zero of joint {joint} is off by {offset}° ± {sigma}°.",
                 joint = joint + 1,
                 offset = format!("{deg:+.3}"),
-                sigma = format!("{sigma:.3}")
+                sigma = shown(sigma, 3)
             );
             numbers.push(evidence("joint", (joint + 1) as f64, ""));
             numbers.push(evidence("offset", deg, "°"));
@@ -162,6 +162,7 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
         views,
         significant: judged.significant,
         accepted: false,
+        applied: false,
     }
 }
 
@@ -184,7 +185,7 @@ fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypo
     } else {
         text!("Views {list} contradict the others: the board is out by up to {mm} mm and {deg}°.")
     };
-    let what = what.with("list", listed(&names)).with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.2}"));
+    let what = what.with("list", listed(&names)).with("mm", shown(mm, 2)).with("deg", shown(deg, 2));
     let why = if deg > TURNED_DEG {
         text!("The board may have been read the wrong way round, or the pose belongs to another image.")
     } else {
@@ -201,6 +202,7 @@ fn of_views(selection: &Selection<'_>, judged: &Judged, views: &[usize]) -> Hypo
         views: names,
         significant: judged.significant,
         accepted: false,
+        applied: false,
     }
 }
 
@@ -228,24 +230,19 @@ fn common(judged: &Judged) -> Vec<Evidence> {
     numbers
 }
 
-/// By how much it explains the data better.
+/// By how much it explains the data better. The robot's noise without it and with it is evidence; in words a report has one
+/// number for that noise, which is that of the answer.
 fn worth(judged: &Judged) -> Text {
-    let [(without_m, with_m), (without_rad, with_rad)] = judged.robot;
+    if !judged.significant {
+        return text!("Chance explains it.");
+    }
     let held_out = judged.held_out.as_ref().map(|(without, with)| {
         text!(
             "Views left out are predicted to {with} mm instead of {without} mm.",
-            with = format!("{:.2}", with.rms_m * 1e3),
-            without = format!("{:.2}", without.rms_m * 1e3)
+            with = shown(with.rms_m * 1e3, 2),
+            without = shown(without.rms_m * 1e3, 2)
         )
     });
-    let explained = text!(
-        "This explains the data {times} times better: the robot's noise goes from {mm_before} mm and {deg_before}° to {mm} \
-         mm and {deg}°.",
-        times = super::times(judged.gain),
-        mm_before = format!("{:.3}", without_m * 1e3),
-        deg_before = format!("{:.3}", without_rad.to_degrees()),
-        mm = format!("{:.3}", with_m * 1e3),
-        deg = format!("{:.3}", with_rad.to_degrees())
-    );
+    let explained = text!("This explains the data {times} times better.", times = super::times(judged.gain));
     Text::sentences([explained].into_iter().chain(held_out))
 }

@@ -11,7 +11,7 @@ use super::{Estimate, Hypothesis};
 use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};
 use crate::estimate::handeye::Mode;
 use crate::text;
-use crate::wording::Text;
+use crate::wording::{Text, shown};
 
 /// Natural logarithm of a likelihood ratio that a gross hypothesis needs after allowance for all that are tried. Of two fixed
 /// laws the wrong one is so much likelier in seven sessions in a thousand at the most (Markov's inequality).
@@ -146,8 +146,8 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
     let ratio = (given_m.max(1e-9) / so_m.max(1e-9)).ln();
     let so_read = text!(
         "So read, the board comes together within {so} mm, as stated within {given} mm (median view).",
-        so = format!("{so_mm:.2}"),
-        given = format!("{given_mm:.2}")
+        so = shown(so_mm, 2),
+        given = shown(given_mm, 2)
     );
     let what = codes.iter().filter_map(|code| gross_words(sight, *code, tried));
     let (camera_m, target_m) = distances(tried);
@@ -170,6 +170,7 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
         },
         significant: false,
         accepted: false,
+        applied: false,
     }
 }
 
@@ -181,15 +182,15 @@ fn gross_words(sight: &SessionViews, code: FindingCode, tried: &Tried) -> Option
              (eye in hand against eye to hand): all three are the same equations. With the robot poses inverted the camera \
              would be {camera} m from what carries it and the target {target} m; with the target poses inverted it is the \
              other way round.",
-            camera = format!("{camera_m:.2}"),
-            target = format!("{target_m:.2}")
+            camera = shown(camera_m, 2),
+            target = shown(target_m, 2)
         ),
         FindingCode::InvertedPoses => text!(
             "The robot poses are the inverse of what is stated, or the camera sits on the other side (eye in hand against \
              eye to hand): both are the same equations. The camera would be {camera} m from what carries it and the board \
              {target} m.",
-            camera = format!("{camera_m:.2}"),
-            target = format!("{target_m:.2}")
+            camera = shown(camera_m, 2),
+            target = shown(target_m, 2)
         ),
         FindingCode::WrongQuaternionOrder => {
             let (has, stated) = if tried.change.w_first() { ("w x y z", "x y z w") } else { ("x y z w", "w x y z") };
@@ -292,16 +293,17 @@ pub(super) fn implausible(robot_m: f64, robot_rad: f64, beside: bool) -> Finding
     let (mm, deg) = (robot_m * 1e3, robot_rad.to_degrees());
     let what = if beside {
         text!(
-            "The robot poses scatter by {mm} mm and {deg}° per axis about what the images say, even with what else was \
-             found, more than an arm errs (below 2 mm and 0.5°)."
+            "Even with what else was found the robot poses scatter about what the images say by more than an arm errs (2 mm and \
+             0.5° per axis)."
         )
     } else {
         text!(
             "The robot poses scatter by {mm} mm and {deg}° per axis about what the images say, more than an arm errs \
-             (below 2 mm and 0.5°)."
+             (below 2 mm and 0.5°).",
+            mm = shown(mm, 2),
+            deg = shown(deg, 3)
         )
     };
-    let what = what.with("mm", format!("{mm:.2}")).with("deg", format!("{deg:.3}"));
     let advice = text!(
         "The arm may have been moving, poses and images may not be of the same moment, or the arm's own geometry is wrong. \
          Capture again at rest; no solver can mend it."

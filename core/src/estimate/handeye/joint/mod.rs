@@ -51,6 +51,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
 pub use residual_distortion::ShownDistortion;
+pub(crate) use shown_field::SIZE_SIGMA;
 pub use shown_field::with_shown_field;
 pub(crate) use shown_warp::warp_ratio;
 pub use solution::{JointSolution, ViewFit};

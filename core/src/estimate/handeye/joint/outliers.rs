@@ -18,7 +18,7 @@ use super::{JointProblem, JointSolution, JointStart, Noise, fit};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::screening::{Distance, Estimator, Judged, limit, screened};
-use crate::estimate::wrong_corners;
+use crate::estimate::{resolution, wrong_corners};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::se3;
 use crate::geometry::statistics::pooled_freedom;
@@ -140,7 +140,7 @@ fn distances(
     let freedom = 0.5 * (6.0 * kept.len() as f64 - determined);
     let of_noise = freedom.max(4.0);
     let slopes = slopes(system, &solution.noise, &covariance);
-    let robot = prior_weight(&solution.noise).map(f64::recip);
+    let robot = prior_weight(&resolution::judged_by(&solution.noise)).map(f64::recip);
     let in_pixels = solution.noise.corner_px.powi(2) + solution.noise.view_px.powi(2);
     let centre = centre(problem, &solution.as_start());
     let judged = views.iter().zip(own).enumerate().map(|(i, (view, own))| {
@@ -167,7 +167,7 @@ fn distances(
         let shared = &by_shared * &covariance * by_shared.transpose();
         let shared = Matrix6::from_fn(|r, c| shared[(r, c)]);
         let own = chain.by_correction * Matrix6::from_diagonal(&robot) * chain.by_correction.transpose()
-            + factor.inverse() * in_pixels;
+            + factor.inverse() * resolution::pose_variance_px2(in_pixels, view.corners.len());
         let expected = if kept.binary_search(&i).is_ok() { own - shared } else { own + shared };
         // A view that the others do not determine has nothing to disagree with.
         let expected = Cholesky::new(expected).or_else(|| Cholesky::new(own));

@@ -19,7 +19,7 @@ const GAIN: f64 = 7.29;
 const NEARLY: f64 = 0.8;
 /// Standard deviation of the size of a target over the stated one, before any data: printers scale to fit, and rulers are
 /// read to half a millimetre on a square of some twenty.
-const SIZE_SIGMA: f64 = 0.03;
+pub(crate) const SIZE_SIGMA: f64 = 0.03;
 
 /// The estimate from `views` with a [`RobotField`](super::RobotField), when they show one; `without` is their estimate
 /// without it. `None` also when the noise levels are given, and with fewer than ten views.
