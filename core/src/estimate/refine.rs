@@ -263,7 +263,7 @@ pub fn judge(
     let heldout = quality::held_out(problem, solution, *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = widening::check(problem, solution, work.cancel)?;
-    solution.widen(widening.factor);
+    solution.widen(&widening);
     Ok(Judged {
         heldout,
         expected_heldout_rms_px: expected.prediction_px,
