@@ -317,7 +317,7 @@ mod tests {
         let model = sample::solved();
         let mut solved = Arc::unwrap_or_clone(model.solve.current().expect("solved").clone());
         let mut said = |factor| {
-            let widening = Some(WideningRecord { factor, by: "jackknife".to_owned() });
+            let widening = Some(WideningRecord { factor, by: "jackknife".to_owned(), lens_factor: None });
             solved.result.estimate.as_mut().expect("a joint estimate").widening = widening;
             page(&solved)
         };

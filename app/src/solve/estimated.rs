@@ -171,7 +171,7 @@ mod tests {
         let mut calibration = model.solve.current().expect("solved").calibration.clone();
         let joint = calibration.joint.as_mut().expect("a joint estimate");
         (joint.shape, joint.joint_offsets) = (None, None);
-        joint.widening = Widening { factor: 1.0, by: None, checks: Vec::new() };
+        joint.widening = Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() };
         joint.noise.view_px = 0.0;
         change(&mut calibration);
         let lines = estimated(&calibration);
@@ -192,8 +192,12 @@ mod tests {
 
     #[test]
     fn a_widening_that_changes_no_figure_is_not_said() {
-        let widened =
-            |times: f64| Widening { factor: times * times, by: Some(Evidence::Neighbours), checks: Vec::new() };
+        let widened = |times: f64| Widening {
+            factor: times * times,
+            by: Some(Evidence::Neighbours),
+            lens: 1.0,
+            checks: Vec::new(),
+        };
         let is_said = |times| {
             let lines = said(|calibration| calibration.joint.as_mut().expect("joint").widening = widened(times));
             lines.iter().any(|(what, _)| what == "Uncertainty widened")
@@ -214,7 +218,7 @@ mod tests {
                 scale_sigma: Some(2e-4),
             });
             joint.noise.view_px = 0.12;
-            joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() };
+            joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
             joint.small_sample.degrees_of_freedom = f64::INFINITY;
             joint.joint_offsets = Some(JointOffsets {
                 offsets_rad: vec![1.0_f64.to_radians(), (-0.5_f64).to_radians()],

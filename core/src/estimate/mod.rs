@@ -274,6 +274,9 @@ pub enum CalibrateError {
     },
 }
 
+/// Where the lens begins among the unknowns that [`JointFit::covariance`] is of: both links come first.
+const LENS_AT: usize = 12;
+
 /// A finished calibration.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
@@ -310,6 +313,17 @@ impl Calibration {
     /// The intrinsics; `None` when only pose pairs were given.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
         self.camera.as_ref().map(|camera| camera.intrinsics)
+    }
+
+    /// Standard deviation of `ln(fx / fy)` of an estimated lens. fx and fy err alike, so it is smaller than theirs.
+    pub fn aspect_sigma(&self) -> Option<f64> {
+        let camera = self.camera.filter(|camera| !camera.fixed)?;
+        let Some(joint) = self.joint.as_ref().filter(|joint| joint.free.intrinsics) else {
+            return self.camera_fit?.aspect_sigma;
+        };
+        let of_lens = joint.covariance.fixed_view::<2, 2>(LENS_AT, LENS_AT);
+        let along = Vector2::new(camera.intrinsics.fx.recip(), -camera.intrinsics.fy.recip());
+        Some(along.dot(&(of_lens * along)).max(0.0).sqrt())
     }
 
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, m and rad; `None` for a closed form.
@@ -376,6 +390,8 @@ pub struct CameraFit {
     /// Standard deviations of fx, fy, cx, cy in pixels, see [`Stated`](intrinsics::Stated); `None` where there are no more
     /// residuals than unknowns.
     pub sigma_px: Option<[f64; 4]>,
+    /// Standard deviation of `ln(fx / fy)`; `None` likewise.
+    pub aspect_sigma: Option<f64>,
     /// Noise of a corner per axis, pixels; `None` likewise.
     pub noise_px: Option<f64>,
     /// By how much standard deviations are larger than those of corners that err independently, because the views scatter
@@ -406,6 +422,7 @@ impl CameraFit {
         let shape = found.shape;
         Self {
             sigma_px: Some(stated.pinhole_sigma_px).filter(|sigma| sigma.iter().all(|s| s.is_finite())),
+            aspect_sigma: Some(stated.aspect_sigma).filter(|sigma| sigma.is_finite()),
             noise_px: Some(found.sigma).filter(|sigma| sigma.is_finite()),
             times: stated.ratio.sqrt(),
             degrees_of_freedom: stated.degrees_of_freedom,

@@ -265,7 +265,7 @@ pub fn judge(
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = widening::check(problem, solution, work.cancel)?;
     let size = size::size(problem, solution, work.cancel)?.map(|size| size.widened(widening.factor));
-    solution.widen(widening.factor);
+    solution.widen(&widening);
     Ok(Judged {
         heldout,
         expected_heldout_rms_px: expected.prediction_px,

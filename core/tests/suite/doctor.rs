@@ -202,7 +202,8 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_a_w
     let (mut open, mut covered, mut covered_before) = (0, 0, 0);
     for seed in 0..12 {
         // Two centimetres and a degree a metre, one way or the other.
-        let per_metre = SMatrix::from_fn(|i, j| if (i + 2 * j + seed as usize).is_multiple_of(3) { 0.02 } else { -0.014 });
+        let per_metre =
+            SMatrix::from_fn(|i, j| if (i + 2 * j + seed as usize).is_multiple_of(3) { 0.02 } else { -0.014 });
         let noisy = Setup {
             robot_m: 1.5e-3,
             robot_rad: 3e-3,

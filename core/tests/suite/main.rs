@@ -7,6 +7,7 @@ mod camera_alone;
 mod doctor;
 mod doctor_on_real_data;
 mod joint_on_real_data;
+mod lens_claims;
 mod reference_datasets;
 #[cfg(feature = "opencv")]
 mod target_data;

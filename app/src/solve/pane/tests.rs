@@ -155,7 +155,7 @@ fn with_everything_found(calibration: &mut handeye_core::estimate::Calibration) 
         warp_sigma_m: Some([3e-5, 2e-5]),
         scale_sigma: None,
     });
-    joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), checks: Vec::new() };
+    joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
     joint.small_sample.level_sigma = [0.1, 0.8, 0.9];
     joint.noise.view_px = 0.12;
     joint.robot_effect_px = 10.0;

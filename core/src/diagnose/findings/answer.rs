@@ -24,6 +24,12 @@ const INFLUENCE: f64 = 0.5;
 const PREDICTION: f64 = 1.5;
 /// Robot noise over corner noise, both in pixels, from which better images hardly help: a tenth part in the square.
 const ROBOT_OVER_CORNERS: f64 = 3.0;
+/// Difference of fx and fy, part of either, that no camera has: pixels are drawn as true squares to a hundredth of a percent, a
+/// lens without cylinders is round, and a sensor would have to lean by 8° against the axis to look 1 % shorter. What is
+/// looked for is larger: 640×480 made of 1280×1024 is 7 % off, of 1920×1080 33 %, a print that was fitted to its page some percent.
+const LEAST_ASPECT: f64 = 0.01;
+/// Standard deviations that the difference has to be beyond that: one camera in seven hundred by chance, if it were just as much off.
+const ASPECT_SIGMAS: f64 = 3.0;
 /// Distance from the middle of the closed forms, metres, from which one of them is worth a word.
 const DISAGREE_M: f64 = 5e-3;
 /// More of the same views than this many times those gathered are no advice.
@@ -36,6 +42,7 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     found.extend(residuals(&used));
     found.extend(corrections(calibration, &used));
     found.extend(prediction(calibration));
+    found.extend(pixel_aspect(calibration));
     found.extend(lens_folds(calibration));
     found.extend(robot_field(calibration));
     found.extend(residual_distortion(calibration));
@@ -144,6 +151,26 @@ fn prediction(calibration: &Calibration) -> Option<Finding> {
     Some(finding.with("heldout_rms", heldout, "px").with("explained_rms", expected, "px"))
 }
 
+fn pixel_aspect(calibration: &Calibration) -> Option<Finding> {
+    let intrinsics = calibration.intrinsics()?;
+    let sigma = calibration.aspect_sigma()?;
+    let aspect = (intrinsics.fx / intrinsics.fy).ln();
+    if aspect.abs() - ASPECT_SIGMAS * sigma < LEAST_ASPECT {
+        return None;
+    }
+    let text = text!(
+        "fx and fy differ by {percent} % ± {sigma} % ({fx} px and {fy} px), where those of a camera agree to a tenth of a \
+         percent. The images were scaled in one direction, or the squares of the target are not square. Give images of the \
+         camera's own proportions, and measure the target along both sides, over as many squares as it has.",
+        percent = format!("{:.2}", 100.0 * aspect.abs()),
+        sigma = format!("{:.2}", 100.0 * sigma),
+        fx = format!("{:.1}", intrinsics.fx),
+        fy = format!("{:.1}", intrinsics.fy)
+    );
+    let finding = Finding::new(FindingCode::PixelAspect, Severity::Warning, text);
+    Some(finding.with("fx_over_fy", intrinsics.fx / intrinsics.fy, "").with("fx_over_fy_sigma", sigma, ""))
+}
+
 fn lens_folds(calibration: &Calibration) -> Option<Finding> {
     let fold = calibration.intrinsics()?.check_fold().err()?;
     let text = text!(
@@ -218,7 +245,7 @@ fn robot_noise(calibration: &Calibration) -> Option<Finding> {
     let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
     let text = text!(
         "The robot limits the answer: its noise of {mm} mm and {deg}° per axis moves corners by {robot} px, their own noise \
-         is {corner} px. Better images will not help much; more views, and settling longer before each, will.",
+         is {corner} px. Better images will not help much; settling longer before each will.",
         mm = shown(mm, 3),
         deg = shown(deg, 3),
         robot = shown(robot_px, 2),

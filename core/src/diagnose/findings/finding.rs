@@ -46,6 +46,8 @@ pub enum FindingCode {
     WrongScale,
     /// The intrinsics given do not fit the images.
     WrongIntrinsics,
+    /// fx and fy differ by more than those of a lens and a sensor do.
+    PixelAspect,
     /// Sessions that are calibrated with one lens differ in it.
     LensesDiffer,
     /// The target moved during the session.

@@ -22,6 +22,7 @@ pub fn findings(calibration: &Calibration) -> Vec<Finding> {
     found.extend(renumbered(calibration));
     found.extend(bent(calibration));
     found.extend(widened(calibration));
+    found.extend(lens_widened(calibration));
     found.extend(unclear(calibration));
     found
 }
@@ -136,6 +137,21 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
         why = by.reason()
     );
     Some(Finding::new(FindingCode::UncertaintyWidened, Severity::Info, text).with("times", times, ""))
+}
+
+/// An estimated lens that single views pull about by more than their noise.
+fn lens_widened(calibration: &Calibration) -> Option<Finding> {
+    let times = calibration.joint.as_ref()?.widening.lens.sqrt();
+    if times < WIDENING_WORTH_SAYING {
+        return None;
+    }
+    let text = text!(
+        "The views disagree about the lens: its stated uncertainty is {times} times what independent corners explain, and the \
+         answer's is larger as far as it rests on the lens. Views tilted by 30° to 45° that cover the whole image make it \
+         smaller.",
+        times = format!("{times:.1}")
+    );
+    Some(Finding::new(FindingCode::UncertaintyWidened, Severity::Info, text).with("lens_times", times, ""))
 }
 
 /// When robot and corner noise cannot be told apart, the robot's level is a guess between zero and what is stated.

@@ -40,9 +40,18 @@ const HELD: f64 = 0.95;
 const GAUSSIAN: f64 = 1.959_963_985;
 
 /// One view's part of the equations of the form.
-struct Score {
-    information: DMatrix<f64>,
-    gradient: DVector<f64>,
+pub(crate) struct Score {
+    pub information: DMatrix<f64>,
+    pub gradient: DVector<f64>,
+}
+
+/// By how much more the views scatter than corners that err independently would make them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scatter {
+    /// Variance shown over variance expected.
+    pub ratio: f64,
+    /// Degrees of freedom of that, at least 1.
+    pub degrees_of_freedom: f64,
 }
 
 /// All views at one estimate.
@@ -114,32 +123,13 @@ impl Evidence {
 
     /// How well `count` unknowns from the column `first` on are known.
     pub fn spread(&self, first: usize, count: usize) -> Spread {
-        let rows = self.covariance.rows(first, count);
         let stated = self.covariance.view((first, first), (count, count)).into_owned();
-        let unchanged = |ratio| Spread { covariance: &stated * self.variance, ratio, degrees_of_freedom: 1.0 };
-        let Some(root) = stated.clone().cholesky().map(|factor| factor.l()) else { return unchanged(1.0) };
-        let Some(whitened) = root.solve_lower_triangular(&rows.into_owned()) else { return unchanged(1.0) };
-        // The trace of the expected covariance of all pulls together, and that of its square, for Satterthwaite's degrees of
-        // freedom: two views are correlated because the form was fitted to both.
-        let (mut shown, mut expected, mut squared) = (0.0, 0.0, 0.0);
-        let mut taken = DMatrix::zeros(self.step.len(), self.step.len());
-        for score in &self.scores {
-            let by_view = &whitened * &score.information;
-            let alone = &by_view * whitened.transpose();
-            let leverage = &by_view * &self.covariance * by_view.transpose();
-            shown += (&whitened * &score.gradient + &by_view * &self.step).norm_squared();
-            expected += alone.trace() - leverage.trace();
-            squared += alone.norm_squared() - 2.0 * alone.dot(&leverage);
-            taken += by_view.tr_mul(&by_view);
-        }
-        let taken = &self.covariance * taken;
-        squared += (&taken * &taken).trace();
-        let ratio = shown / (self.variance * expected);
-        // Corners without any noise leave rounding over rounding.
-        if !(ratio.is_finite() && ratio > 0.0 && squared > 0.0) {
-            return unchanged(1.0);
-        }
-        let degrees_of_freedom = (expected.powi(2) / squared).max(1.0);
+        let found = scatter(&self.scores, &self.covariance, &self.step, (first, count)).and_then(|found| {
+            let ratio = found.ratio / self.variance;
+            // Corners without any noise leave rounding over rounding.
+            (ratio.is_finite() && ratio > 0.0).then_some(Scatter { ratio, ..found })
+        });
+        let Scatter { ratio, degrees_of_freedom } = found.unwrap_or(Scatter { ratio: 1.0, degrees_of_freedom: 1.0 });
         Spread { covariance: stated * (self.variance * ratio), ratio, degrees_of_freedom }
     }
 
@@ -163,12 +153,53 @@ impl Evidence {
     }
 }
 
+/// How views scatter in `count` unknowns from the column `first` on, for corners of variance 1: `covariance` is `C` and `step`
+/// is `b`. `None` where the unknowns are not determined.
+pub(crate) fn scatter(
+    scores: &[Score],
+    covariance: &DMatrix<f64>,
+    step: &DVector<f64>,
+    (first, count): (usize, usize),
+) -> Option<Scatter> {
+    let stated = covariance.view((first, first), (count, count)).into_owned();
+    let root = stated.cholesky()?.l();
+    let whitened = root.solve_lower_triangular(&covariance.rows(first, count).into_owned())?;
+    // The trace of the expected covariance of all pulls together, and that of its square, for Satterthwaite's degrees of
+    // freedom: two views are correlated because the form was fitted to both.
+    let (mut shown, mut expected, mut squared) = (0.0, 0.0, 0.0);
+    let mut taken = DMatrix::zeros(step.len(), step.len());
+    for score in scores {
+        let by_view = &whitened * &score.information;
+        let alone = &by_view * whitened.transpose();
+        let leverage = &by_view * covariance * by_view.transpose();
+        shown += (&whitened * &score.gradient + &by_view * step).norm_squared();
+        expected += alone.trace() - leverage.trace();
+        squared += alone.norm_squared() - 2.0 * alone.dot(&leverage);
+        taken += by_view.tr_mul(&by_view);
+    }
+    let taken = covariance * taken;
+    squared += (&taken * &taken).trace();
+    let ratio = shown / expected;
+    (ratio.is_finite() && squared > 0.0)
+        .then(|| Scatter { ratio, degrees_of_freedom: (expected.powi(2) / squared).max(1.0) })
+}
+
 impl Spread {
     /// The standard deviation of the unknown `i` of which a Gaussian's 95 % interval holds its error in 95 % of cases: that
     /// of few degrees of freedom is wider.
     pub fn sigma(&self, i: usize) -> f64 {
-        let times = StudentsT::new(0.0, 1.0, self.degrees_of_freedom)
-            .map_or(1.0, |student| student.inverse_cdf(0.5 + 0.5 * HELD) / GAUSSIAN);
-        times * self.covariance[(i, i)].sqrt()
+        self.times() * self.covariance[(i, i)].sqrt()
+    }
+
+    /// The same of a sum of the unknowns, each so many times.
+    pub fn sigma_along(&self, times: &[f64]) -> f64 {
+        let along = DVector::from_column_slice(times);
+        self.times() * along.dot(&(&self.covariance * &along)).max(0.0).sqrt()
+    }
+
+    /// Half the width of an interval of so few degrees of freedom over that of a Gaussian.
+    fn times(&self) -> f64 {
+        StudentsT::new(0.0, 1.0, self.degrees_of_freedom)
+            .map_or(1.0, |student| student.inverse_cdf(0.5 + 0.5 * HELD) / GAUSSIAN)
     }
 }

@@ -23,7 +23,7 @@
 
 mod adjust;
 mod error;
-mod evidence;
+pub(crate) mod evidence;
 mod information;
 mod screened;
 mod seen_view;
@@ -122,6 +122,8 @@ pub struct Stated {
     /// Of fx, fy, cx and cy, pixels: 1.96 of them hold the error in 95 % of cases. Not a number where there are no more
     /// residuals than unknowns.
     pub pinhole_sigma_px: [f64; 4],
+    /// Of `ln(fx / fy)` likewise: fx and fy err alike, so it is known better than either.
+    pub aspect_sigma: f64,
     /// Of the two warps likewise, metres; `None` where the target was taken for flat.
     pub warp_sigma_m: Option<[f64; 2]>,
     /// Variance of the pinhole that the views show over that of corners that err independently.
@@ -275,7 +277,11 @@ fn finish(
 fn stated(problem: &Problem<'_>, intrinsics: &Intrinsics, evidence: &Evidence) -> Stated {
     let pinhole = evidence.spread(0, 4);
     let warp = problem.free.warp.then(|| evidence.spread(problem.free.warp_at(intrinsics), 2));
+    // By fx, fy, cx and cy.
+    let aspect = [intrinsics.fx.recip(), -intrinsics.fy.recip(), 0.0, 0.0];
+    let aspect_left_out: f64 = (0..4).map(|i| aspect[i] * evidence.left_out(i)).sum();
     Stated {
+        aspect_sigma: pinhole.sigma_along(&aspect).hypot(aspect_left_out),
         // How far the bend that was left out would move the answer counts as an error of it.
         pinhole_sigma_px: std::array::from_fn(|i| pinhole.sigma(i).hypot(evidence.left_out(i))),
         warp_sigma_m: warp.map(|warp| [warp.sigma(0), warp.sigma(1)]),

@@ -258,7 +258,10 @@ fn fitted(
     let solution = &refined.screened.solution;
     let factor = match factor {
         Some(factor) => factor,
-        None => widening::check(&problem, solution, work.cancel)?.factor,
+        None => {
+            let widening = widening::check(&problem, solution, work.cancel)?;
+            widening.factor * widening.lens
+        }
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.
     let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));

@@ -130,6 +130,8 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
     estimate.reference_point_m.map_or(Ok(()), |p| all_finite(&p, "estimate.reference_point_m"))?;
     if let Some(widening) = &estimate.widening {
         require(widening.factor >= 1.0, "estimate.widening.factor", "must be at least 1")?;
+        let of_lens = widening.lens_factor.is_none_or(|factor| factor >= 1.0);
+        require(of_lens, "estimate.widening.lens_factor", "must be at least 1")?;
     }
     if let Some(board) = &estimate.board {
         all_finite(&board.warp_mm, "estimate.board.warp_mm")?;

@@ -84,6 +84,7 @@ impl Calibration {
             widening: Some(WideningRecord {
                 factor: joint.widening.factor.sqrt(),
                 by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
+                lens_factor: Some(joint.widening.lens.sqrt()).filter(|factor| *factor > 1.0),
             }),
             board: joint.shape.map(board),
             target_size: joint.size.as_ref().map(|size| TargetSizeEstimate {
@@ -117,6 +118,7 @@ fn of_camera(fit: &CameraFit) -> EstimateDetails {
         widening: Some(WideningRecord {
             factor: fit.times.max(1.0),
             by: if widened { Evidence::Jackknife.name() } else { "none" }.to_owned(),
+            lens_factor: None,
         }),
         board: fit.shape.map(board),
         ..EstimateDetails::default()

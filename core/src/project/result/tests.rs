@@ -52,7 +52,7 @@ pub(crate) fn golden() -> CalibrationResult {
         degrees_of_freedom: Some(31.5),
         region_scale: Some(0.97),
         view_sigma_px: Some(0.0),
-        widening: Some(WideningRecord { factor: 1.4, by: "neighbours".to_owned() }),
+        widening: Some(WideningRecord { factor: 1.4, by: "neighbours".to_owned(), lens_factor: Some(2.0) }),
         target_size: Some(TargetSizeEstimate { true_over_stated: 1.001, sigma: 0.002, determined: true }),
         board: Some(BoardEstimate {
             warp_mm: [0.16, -0.03],

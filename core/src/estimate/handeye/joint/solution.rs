@@ -1,5 +1,6 @@
 //! What the joint estimate finds.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
@@ -10,6 +11,7 @@ use crate::estimate::handeye::joint::integrated::SmallSample;
 use crate::estimate::handeye::joint::normal::System;
 use crate::estimate::handeye::joint::problem::{Free, JointStart, Noise};
 use crate::estimate::handeye::{HandEye, HandEyeError};
+use crate::estimate::uncertainty::widening::{self, Widening};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::bent::BoardShape;
@@ -92,7 +94,7 @@ impl JointSolution {
 
     /// Standard deviations of the free intrinsics in the order of [`Intrinsics::parameters`]; empty when fixed.
     pub fn intrinsics_sigma(&self) -> Vec<f64> {
-        (12..12 + self.free.form().warp_at(&self.intrinsics)).map(|i| self.sigma(i)).collect()
+        self.lens_places().map(|i| self.sigma(i)).collect()
     }
 
     /// Covariance of the two warps, square metres; `None` when they were not estimated.
@@ -116,9 +118,17 @@ impl JointSolution {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
 
-    /// Multiplies the covariance, because the data show that it is too small.
-    pub fn widen(&mut self, factor: f64) {
-        self.covariance *= factor;
+    /// Multiplies the covariance, and that of a free lens with what rests on it, because the data show that they are too small.
+    pub fn widen(&mut self, widening: &Widening) {
+        if widening.lens > 1.0 {
+            self.covariance = widening::of_lens(&self.covariance, self.lens_places(), widening.lens);
+        }
+        self.covariance *= widening.factor;
+    }
+
+    /// Where the free intrinsics are in the covariance; empty when they are fixed.
+    pub fn lens_places(&self) -> Range<usize> {
+        12..12 + self.free.form().warp_at(&self.intrinsics)
     }
 
     /// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints and

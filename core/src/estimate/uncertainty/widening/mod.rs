@@ -11,9 +11,11 @@
 //! | [`Evidence::Neighbours`] | robot corrections of neighbouring poses, which must not resemble each other |
 //! | [`Evidence::Jackknife`] | how far the answer moves without one view |
 //! | [`Evidence::CrossValidation`] | how well a view left out is predicted |
+//! | [`Evidence::Lens`] | how far single views pull an estimated lens |
 //!
 //! The covariance is multiplied by the largest ratio among those that chance explains in fewer than one case in a
-//! hundred, and by nothing if there is none. All of it is done on the equations linearised at the solution: leaving a
+//! hundred, and by nothing if there is none. What views say of the lens widens the lens alone, and the rest as far as it rests
+//! on the lens ([`of_lens`]). All of it is done on the equations linearised at the solution: leaving a
 //! view out takes a product of small matrices, not another fit.
 //!
 //! [`RobotField`]: crate::estimate::handeye::joint::RobotField
@@ -25,10 +27,12 @@
 
 mod cross_validation;
 mod jackknife;
+mod lens;
 mod linear;
 mod neighbours;
 mod permutation;
 
+pub use lens::of_lens;
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::handeye::HandEyeError;
@@ -48,6 +52,8 @@ pub enum Evidence {
     Jackknife,
     /// Prediction of views left out.
     CrossValidation,
+    /// What single views say of an estimated lens.
+    Lens,
 }
 
 impl Evidence {
@@ -57,6 +63,7 @@ impl Evidence {
             Self::Neighbours => "neighbours",
             Self::Jackknife => "jackknife",
             Self::CrossValidation => "cross_validation",
+            Self::Lens => "lens",
         }
     }
 
@@ -66,6 +73,7 @@ impl Evidence {
             Self::Neighbours => text!("the robot is off in the same direction in neighbouring poses"),
             Self::Jackknife => text!("the answer moves too far without single views"),
             Self::CrossValidation => text!("views left out are predicted worse than stated"),
+            Self::Lens => text!("the views disagree about the lens"),
         }
     }
 }
@@ -95,6 +103,8 @@ pub struct Widening {
     pub factor: f64,
     /// Which evidence asks for it; `None` where none refutes the covariance as it is.
     pub by: Option<Evidence>,
+    /// What the covariance of an estimated lens is to be multiplied by, 1 or more; see [`of_lens`].
+    pub lens: f64,
     /// Every check that could be made, none with fewer than [`NEED`] views.
     pub checks: Vec<Check>,
 }
@@ -102,8 +112,8 @@ pub struct Widening {
 /// Views from which on checks are made: with fewer no order of them is rarer than one in a hundred.
 pub const NEED: usize = 6;
 
-/// Probability below which the covariance counts as refuted. There are three checks, so three healthy sessions in a hundred
-/// are widened without need at the most, which costs the others nothing.
+/// Probability below which the covariance counts as refuted. There are three checks, and one of an estimated lens, so four healthy
+/// sessions in a hundred are widened without need at the most, which costs the others nothing.
 const SIGNIFICANT: f64 = 0.01;
 
 /// Checks the covariance of a solution against its own data. The cost is linear in the number of views.
@@ -117,14 +127,19 @@ pub fn check<'a>(
 ) -> Result<Widening, HandEyeError> {
     let work = work.into();
     if problem.views.len() < NEED {
-        return Ok(Widening { factor: 1.0, by: None, checks: Vec::new() });
+        return Ok(Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() });
     }
     let views = linear::views(problem, solution, &work)?;
     let mut checks =
         vec![jackknife::check(&views), neighbours::check(&views), cross_validation::check(problem, solution, &work)?];
+    checks.extend(lens::check(problem, solution, &work)?);
     checks.retain(|check| check.ratio.is_finite() && check.p_value.is_finite());
-    let largest = checks.iter().filter(|c| c.is_significant()).max_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    Ok(Widening { factor: largest.map_or(1.0, |c| c.ratio), by: largest.map(|c| c.by), checks })
+    let (of_lens, of_all): (Vec<&Check>, Vec<&Check>) =
+        checks.iter().filter(|c| c.is_significant()).partition(|c| c.by == Evidence::Lens);
+    let largest = of_all.into_iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    let (factor, by) = (largest.map_or(1.0, |c| c.ratio), largest.map(|c| c.by));
+    let lens = of_lens.first().map_or(1.0, |c| c.ratio);
+    Ok(Widening { factor, by, lens, checks })
 }
 
 #[cfg(test)]

@@ -100,7 +100,7 @@ fn the_check_is_the_same_every_time_and_says_nothing_of_few_views() {
     let t = trial(Mode::EyeToHand, 9, &REALISTIC, camera(), 5);
     assert_eq!(solve(&t, false).1, solve(&t, false).1);
     let t = trial(Mode::EyeToHand, 5, &REALISTIC, camera(), 5);
-    assert_eq!(solve(&t, false).1, Widening { factor: 1.0, by: None, checks: Vec::new() });
+    assert_eq!(solve(&t, false).1, Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() });
 }
 
 /// `HANDEYE_TRIALS` makes a study of it, of minutes, with that many sessions of each kind.

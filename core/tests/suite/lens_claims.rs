@@ -1,0 +1,60 @@
+//! What is said of a lens beside a robot; the study `lens_claims` does it at length.
+
+#[expect(dead_code, reason = "the study draws more than is tested here")]
+#[path = "../../studies/lens_claims/scene.rs"]
+mod scene;
+
+use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
+use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
+use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
+use handeye_core::progress::CancelToken;
+use scene::Scene;
+
+const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
+
+/// As the command line makes it.
+fn examined(observations: &Observations) -> (Calibration, Diagnosis) {
+    let cancel = CancelToken::default();
+    let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("calibrates");
+    let diagnosis = diagnose(observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+    (calibration, diagnosis)
+}
+
+fn named(diagnosis: &Diagnosis, code: FindingCode) -> Option<&Finding> {
+    diagnosis.findings.iter().find(|finding| finding.code == code)
+}
+
+#[test]
+fn fx_and_fy_that_differ_by_more_than_those_of_a_camera_are_named() {
+    for aspect in [0.03, -0.03] {
+        let scene = Scene { aspect, ..Scene::new(Mode::EyeInHand, 14) };
+        let session = scene.draw(3);
+        for observations in [session.alone(), session.unknown()] {
+            let (_, diagnosis) = examined(&observations);
+            let finding = named(&diagnosis, FindingCode::PixelAspect).expect("it is named");
+            assert_eq!(finding.severity, Severity::Warning);
+            let (ratio, sigma) =
+                (finding.value("fx_over_fy").expect("there"), finding.value("fx_over_fy_sigma").expect("there"));
+            let truth = session.lens[0] / session.lens[1];
+            assert!((ratio - truth).abs() < 4.0 * sigma && sigma < 2e-3, "{ratio} ± {sigma} for {truth}");
+            assert!(finding.to_string().contains("scaled in one direction"), "{finding}");
+        }
+    }
+}
+
+#[test]
+fn fx_and_fy_of_a_camera_are_not_accused_where_views_tell_them_badly() {
+    for mode in MODES {
+        for seed in 0..3 {
+            // Twelve degrees of tilt at most, and no turns about the axis of the camera.
+            let scene = Scene { tilt_deg: 12.0, roll_deg: 5.0, shared_px: 0.1, ..Scene::new(mode, 8) };
+            let session = scene.draw(seed);
+            for observations in [session.alone(), session.unknown()] {
+                let (_, diagnosis) = examined(&observations);
+                let accused = named(&diagnosis, FindingCode::PixelAspect);
+                assert!(accused.is_none(), "{mode:?} {seed}: {accused:?}");
+            }
+        }
+    }
+}
