@@ -7,6 +7,14 @@ use handeye_tests::served::{SOON, Served, frame};
 use serde_json::json;
 use tungstenite::Message;
 
+/// A request to become the connection of a page.
+fn upgrade(host: &str, more: &str) -> String {
+    format!(
+        "GET /socket?page=x HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n{more}\r\n"
+    )
+}
+
 #[test]
 fn pages_of_other_sites_files_elsewhere_and_forms_are_refused() {
     let served = Served::start(&[]);
