@@ -19,11 +19,9 @@ use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_core::plan::guided::GuidedOptions;
 use handeye_core::plan::guided::choose::Proposal;
 use handeye_core::project::session::{CaptureId, Document};
-use handeye_core::project::taught_poses::{TaughtJoint, TaughtOn, TaughtPose};
-use handeye_core::targets::TargetSpec;
 use handeye_core::verify::Predictor;
 use handeye_sim_link::cell::scene::SceneChoice;
-use handeye_sim_link::client::cell::{ArmKinematics, CellPart, CellPaths};
+use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
 pub use crate::by_hand::state::ByHand;
@@ -578,33 +576,6 @@ impl Model {
         each || is_first && self.may_be_real()
     }
 
-    /// The cell that poses are taught on now, before this target; `None` before it is connected.
-    pub fn taught_on(&self, target: TargetSpec) -> Option<TaughtOn> {
-        let cell = self.cell.as_ref()?;
-        let base = match &self.source {
-            CellSource::BuiltIn(scene) => format!("built-in cell, scene {}", scene_name(scene)),
-            CellSource::Address(address) => format!("{address}, {}", self.objects.get(CellPart::Tip)),
-            CellSource::Drivers(drivers) => drivers.to_string(),
-        };
-        let joints = cell.joints.iter().map(|joint| TaughtJoint { kind: joint.kind, range: joint.range });
-        // Behind a driver it is found while the arm moves, a little otherwise each time.
-        let arm = cell.arm.as_ref().filter(|_| cell.moves == Moves::Freely);
-        let at_zero = |arm: &ArmKinematics| arm.tip(&JointValues::zeros(cell.joints.len())).translation().into();
-        Some(TaughtOn { base, joints: joints.collect(), tip_at_zero_m: arm.map(at_zero), target })
-    }
-
-    /// The taught poses of this cell; none before it is connected.
-    pub fn taught(&self) -> Vec<&TaughtPose> {
-        let Some(cell) = self.taught_on(self.document().meta.target) else { return Vec::new() };
-        self.document().taught.iter().filter(|pose| pose.is_of(Some(&cell))).collect()
-    }
-
-    /// Whether the reference poses are meant for this cell: for CoppeliaSim's UR5 in front of its board.
-    pub fn has_reference_poses(&self) -> bool {
-        let cell = self.cell.as_ref().filter(|cell| cell.moves == Moves::Freely);
-        cell.and_then(|cell| cell.arm.as_ref()).is_some_and(ArmKinematics::is_ur5)
-    }
-
     /// Share of its fastest speed at which the arm moves: as the user wants it, or else a quarter, and half in the built-in
     /// cell, because behind an address there may be a real arm.
     pub fn speed(&self) -> f64 {
@@ -656,13 +627,5 @@ impl LinkState {
             CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },
             CellSource::Drivers(drivers) => Self::Searching { address: drivers.to_string(), attempt: 1, why: None },
         }
-    }
-}
-
-/// A scene by the name of its file or that it comes with.
-fn scene_name(scene: &SceneChoice) -> String {
-    match scene {
-        SceneChoice::Shipped(shipped) => shipped.name().to_owned(),
-        SceneChoice::File(file) => file.display().to_string(),
     }
 }
