@@ -266,7 +266,7 @@ fn files_that_are_written_to_take_for_ever_are_read_once() {
     put("brackets.txt", "[".repeat(4_000_000));
     put("programs.txt", "p[".repeat(1_000_000));
     put("targets.src", "robtarget [[".repeat(500_000));
-    put("names.txt", (0..300_000).fold(String::new(), |text, i| text + &format!("n{i} 1 2 3 ")));
+    put("names.txt", (0..300_000).map(|i| format!("n{i} 1 2 3 ")).collect::<Vec<_>>().concat());
     put("parts.json", format!("[{}[1]]", "[[1,2,3],[1,2,3],[1,2,4]],".repeat(20_000)));
     put("fields.json", {
         let fields: Vec<String> = (0..20_000).map(|i| format!("\"tvec_{i}\":[1,2,3],\"rvec_{i}\":[1,2,{i}]")).collect();
