@@ -25,6 +25,44 @@ fn named(diagnosis: &Diagnosis, code: FindingCode) -> Option<&Finding> {
     diagnosis.findings.iter().find(|finding| finding.code == code)
 }
 
+/// Programs differ by half a pixel in where an image begins, and a lens of another one is off by that.
+#[test]
+fn a_given_lens_whose_centre_is_half_a_pixel_off_is_named_and_counted() {
+    for mode in MODES {
+        for seed in 0..3 {
+            let session = Scene { corner_px: 0.03, robot: (2e-5, 5e-5), ..Scene::new(mode, 20) }.draw(seed);
+            let (calibration, diagnosis) = examined(&session.given([0.5, 0.5]));
+            let finding = named(&diagnosis, FindingCode::WrongIntrinsics).expect("it is named");
+            assert_eq!(finding.severity, Severity::Warning);
+            let said = finding.to_string();
+            assert!(said.contains("half a pixel"), "{mode:?} {seed}: {said}");
+            let right = format!("cx = {:.2} and cy = {:.2}", session.lens[2], session.lens[3]);
+            assert!(said.contains(&right), "{mode:?} {seed}: {said}, not {right}");
+            let (error_m, stated_m) = session.errors_m(&calibration).expect("answered");
+            let stated_m = stated_m.expect("one cause explains it");
+            assert!(error_m > 3e-4, "{mode:?} {seed}: the lens changes nothing: nothing is asserted");
+            assert!(
+                (error_m..2.0 * error_m).contains(&stated_m),
+                "{mode:?} {seed}: off by {error_m}, stated {stated_m}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_given_lens_that_is_right_is_not_accused() {
+    for mode in MODES {
+        for (corner_px, robot) in
+            [(0.0, (0.0, 0.0)), (0.03, (1e-5, 3e-5)), (0.1, (1e-4, 3.5e-4)), (0.3, (1e-4, 3.5e-4))]
+        {
+            let session = Scene { corner_px, robot, shared_px: 0.5 * corner_px, ..Scene::new(mode, 16) }.draw(7);
+            let (_, diagnosis) = examined(&session.given([0.0, 0.0]));
+            let accused = named(&diagnosis, FindingCode::WrongIntrinsics);
+            assert!(accused.is_none(), "{mode:?}, {corner_px} px, {robot:?}: {accused:?}");
+        }
+    }
+}
+
 #[test]
 fn fx_and_fy_that_differ_by_more_than_those_of_a_camera_are_named() {
     for aspect in [0.03, -0.03] {

@@ -102,7 +102,7 @@ fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
         Effect::Warp => joint.free.warp,
         Effect::Scale => joint.free.scale,
         Effect::Joint(_) => joint.joint_offsets.as_ref().is_some_and(|offsets| offsets.accepted),
-        Effect::Lens | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
+        Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
     }
 }
 

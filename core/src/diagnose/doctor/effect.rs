@@ -1,5 +1,7 @@
 //! What a hypothesis does to the views: its columns in the linear model.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::model::Model;
@@ -13,6 +15,9 @@ pub(super) enum Effect {
     Warp,
     /// The intrinsics given are wrong: all parameters of the lens.
     Lens,
+    /// The centre of the intrinsics given is wrong: two pixels. Of the lens it is what the images show least and what other
+    /// programs count in another way; by itself it stands out where all parameters together do not.
+    Centre,
     /// The target moved on its carrier before this view: a twist in the target's frame.
     BoardMoved(usize),
     /// The camera moved on its carrier before this view: a twist in the camera's frame.
@@ -21,12 +26,20 @@ pub(super) enum Effect {
     Joint(usize),
 }
 
+/// Places of cx and cy among the parameters of every lens.
+const CENTRE: Range<usize> = 2..4;
+
 impl Effect {
+    /// Whether it says that the intrinsics given are wrong.
+    pub fn is_of_lens(self) -> bool {
+        matches!(self, Self::Lens | Self::Centre)
+    }
+
     /// How many numbers it takes.
     pub fn numbers(self, lens: usize) -> usize {
         match self {
             Self::Scale | Self::Joint(_) => 1,
-            Self::Warp => 2,
+            Self::Warp | Self::Centre => 2,
             Self::Lens => lens,
             Self::BoardMoved(_) | Self::CameraMoved(_) => 6,
         }
@@ -37,6 +50,7 @@ impl Effect {
         match self {
             Self::Warp => vec![lens, lens + 1],
             Self::Lens => (0..lens).collect(),
+            Self::Centre => CENTRE.collect(),
             _ => Vec::new(),
         }
     }
@@ -57,6 +71,7 @@ impl Effect {
             }
             Self::Warp => seen.by_form.columns(lens, 2).into_owned(),
             Self::Lens => seen.by_form.columns(0, lens).into_owned(),
+            Self::Centre => seen.by_form.columns(CENTRE.start, CENTRE.len()).into_owned(),
             Self::BoardMoved(from) => square(&nalgebra::Matrix6::identity(), view >= from),
             Self::CameraMoved(from) => square(&row.by_hand_eye, view >= from),
             Self::Joint(joint) => {

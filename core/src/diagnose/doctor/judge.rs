@@ -21,6 +21,9 @@ pub(super) const LEAST_SCALE: f64 = 3e-3;
 const LEAST_WARP: f64 = 2e-3;
 /// Relative error of a focal length.
 const LEAST_FOCAL: f64 = 3e-3;
+/// Error of a lens's centre, pixels: a fifth of the commonest mistake, and as much as what corners of a printed board have in
+/// common (blur, light from one side) makes of it.
+const LEAST_CENTRE_PX: f64 = 0.1;
 /// Displacement of the board or the camera, metres at the board: as far as a taped sheet creeps.
 const LEAST_MOVED_M: f64 = 2e-4;
 /// Zero of a joint, radians: two hundredths of a degree, about what controllers are calibrated to.
@@ -74,7 +77,7 @@ impl Judged {
     pub fn holds(&self) -> bool {
         let held_out = match (&self.candidate, &self.held_out) {
             // Corners say it themselves, each of hundreds; views are left out, not modelled.
-            (Candidate::Effect(Effect::Warp | Effect::Lens) | Candidate::Views(_), _) => true,
+            (Candidate::Effect(Effect::Warp | Effect::Lens | Effect::Centre) | Candidate::Views(_), _) => true,
             (Candidate::Effect(_), None) => false,
             (Candidate::Effect(_), Some((without, with))) => with.is_better_than(without, self.ln_alternatives),
         };
@@ -129,7 +132,8 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
             count = effect.numbers(lens);
             let at = fit.width() - count;
             wald = fit.wald(at, count)?;
-            freedom = fit.freedom(at, count);
+            let form = if effect.is_of_lens() { model.sight.form_freedom } else { f64::INFINITY };
+            freedom = fit.freedom(at, count).min(form);
             numbers = fit.theta.rows(at, count).iter().copied().collect();
             sigma = (at..at + count).map(|i| fit.covariance[(i, i)].max(0.0).sqrt()).collect();
             ln_alternatives = alternatives(model, *effect);
@@ -227,6 +231,7 @@ fn matters(model: &Model<'_>, judged: &Judged) -> bool {
             let off = |k: usize, f: f64| judged.numbers.get(k).is_some_and(|v| v.abs() >= LEAST_FOCAL * f);
             off(0, camera.fx) || off(1, camera.fy) || off(2, camera.fx) || off(3, camera.fy)
         }),
+        Effect::Centre => size >= LEAST_CENTRE_PX,
         Effect::BoardMoved(_) | Effect::CameraMoved(_) => moved_m(model, *effect, &judged.numbers) >= LEAST_MOVED_M,
     }
 }

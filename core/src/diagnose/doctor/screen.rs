@@ -24,8 +24,9 @@ pub(super) fn screened(model: &Model<'_>, state: &State, fit: &Fit, room: usize)
         let mut singles = vec![Effect::Scale];
         if model.sight.intrinsics.is_some() {
             singles.push(Effect::Warp);
-            if !model.sight.lens_free {
-                singles.push(Effect::Lens);
+            // The centre is one of all parameters: beside one of the two the other has nothing left to say.
+            if !model.sight.lens_free && !state.effects.iter().any(|effect| effect.is_of_lens()) {
+                singles.extend([Effect::Lens, Effect::Centre]);
             }
         }
         found.extend(singles.into_iter().filter(|e| !state.effects.contains(e)).map(Candidate::Effect));

@@ -126,6 +126,7 @@ impl Selection<'_> {
 
 fn same_kind(a: &Candidate, b: &Candidate) -> bool {
     match (a, b) {
+        (Candidate::Effect(a), Candidate::Effect(b)) if a.is_of_lens() => b.is_of_lens(),
         (Candidate::Effect(a), Candidate::Effect(b)) => std::mem::discriminant(a) == std::mem::discriminant(b),
         (Candidate::Views(_), Candidate::Views(_)) => true,
         _ => false,

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::{Mode, subset};
+use crate::estimate::intrinsics::evidence::{Scatter, Score, scatter};
 use crate::estimate::intrinsics::{self, Options, SeenView};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView, resolution};
 use crate::geometry::camera::Intrinsics;
@@ -75,6 +76,8 @@ pub(crate) struct SessionViews {
     /// What the corners, apart from the poses, say of lens and warp: information and gradient in units of the noise.
     pub form_information: DMatrix<f64>,
     pub form_gradient: DVector<f64>,
+    /// Degrees of freedom of how the views scatter, which the variances of a lens given and of a bend rest on.
+    pub form_freedom: f64,
     /// Four outer points of the target.
     pub outer: [Point3<f64>; 4],
     /// `xiᵀ K xi` is the mean squared displacement of the target's points by a small motion `xi` of it, m².
@@ -142,6 +145,7 @@ impl SessionViews {
             corner_px: None,
             form_information: DMatrix::zeros(0, 0),
             form_gradient: DVector::zeros(0),
+            form_freedom: f64::INFINITY,
             outer,
             displacement,
             distance_m: 0.0,
@@ -202,8 +206,7 @@ impl SessionViews {
         // Nothing is judged by less.
         let typical = typical.max(resolution::CORNER_PX.powi(2));
         self.corner_px = Some(typical.sqrt());
-        self.form_information = DMatrix::zeros(count, count);
-        self.form_gradient = DVector::zeros(count);
+        let mut scores = Vec::with_capacity(seen.len());
         for ((row, view), fit) in seen.iter().zip(fits) {
             let (Some(fit), Some(base_from_tip)) = (fit, view.base_from_tip) else { continue };
             let pose = *fit.pose.best.camera_from_target.isometry();
@@ -220,10 +223,9 @@ impl SessionViews {
             let variance = if own > NOISY * NOISY * typical { own } else { typical };
             let by_pose = equations.pose_by_form.columns(0, count).into_owned();
             let by_form = inverse * &by_pose;
-            self.form_information +=
-                (equations.form.view((0, 0), (count, count)) - by_pose.transpose() * &by_form) / variance;
-            self.form_gradient +=
-                (equations.form_gradient.rows(0, count) - by_form.transpose() * equations.pose_gradient) / variance;
+            let information = equations.form.view((0, 0), (count, count)) - by_pose.transpose() * &by_form;
+            let gradient = equations.form_gradient.rows(0, count) - by_form.transpose() * equations.pose_gradient;
+            scores.push(Score { information: information / variance, gradient: gradient / variance });
             let possible = fit.pose.possible_alternative(fit.corners.len(), variance.sqrt());
             self.views.push(SessionView {
                 name: view.name.clone(),
@@ -238,13 +240,46 @@ impl SessionViews {
                 corners: view.corners.as_ref().map_or(0, |corners| corners.len()),
             });
         }
+        self.take_form(&scores, count);
         Ok(())
+    }
+
+    /// What all views say of the form. Corners of one view err alike (blur, a print that is not true), so what they say of a lens
+    /// that was given counts as much less as the views scatter more than independent corners would make them.
+    fn take_form(&mut self, scores: &[Score], count: usize) {
+        self.form_information = scores.iter().fold(DMatrix::zeros(count, count), |sum, score| sum + &score.information);
+        self.form_gradient = scores.iter().fold(DVector::zeros(count), |sum, score| sum + &score.gradient);
+        if self.lens_free {
+            return;
+        }
+        if let Some(scatter) = pinhole_scatter(scores) {
+            let times = scatter.ratio.max(1.0);
+            self.form_information /= times;
+            self.form_gradient /= times;
+            self.form_freedom = scatter.degrees_of_freedom;
+        }
     }
 
     /// Number of lens parameters among the form's; the two warps follow.
     pub fn lens_count(&self) -> usize {
         self.intrinsics.as_ref().map_or(0, Intrinsics::parameter_count)
     }
+}
+
+/// How the views scatter in what they say of focal lengths and centre, the rest of the lens as given; `None` where they say
+/// nothing of them.
+fn pinhole_scatter(scores: &[Score]) -> Option<Scatter> {
+    const PINHOLE: usize = 4;
+    let of_pinhole = |score: &Score| Score {
+        information: score.information.view((0, 0), (PINHOLE, PINHOLE)).into_owned(),
+        gradient: score.gradient.rows(0, PINHOLE).into_owned(),
+    };
+    let scores: Vec<Score> = scores.iter().map(of_pinhole).collect();
+    let information = scores.iter().fold(DMatrix::zeros(PINHOLE, PINHOLE), |sum, score| sum + &score.information);
+    let gradient = scores.iter().fold(DVector::zeros(PINHOLE), |sum, score| sum + &score.gradient);
+    let covariance = super::model::inverse(&information)?;
+    let step = -(&covariance * gradient);
+    scatter(&scores, &covariance, &step, (0, PINHOLE))
 }
 
 impl Fit {

@@ -256,12 +256,11 @@ fn fitted(
     let kept = refined.screened.kept_views();
     let problem = session.problem(&refined, &kept, prior);
     let solution = &refined.screened.solution;
-    let factor = match factor {
-        Some(factor) => factor,
-        None => {
-            let widening = widening::check(&problem, solution, work.cancel)?;
-            widening.factor * widening.lens
-        }
+    let factor = if let Some(factor) = factor {
+        factor
+    } else {
+        let widening = widening::check(&problem, solution, work.cancel)?;
+        widening.factor * widening.lens
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.
     let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));

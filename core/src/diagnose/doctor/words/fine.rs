@@ -8,7 +8,7 @@ use super::super::judge::{Judged, moved_m};
 use super::super::model::Model;
 use super::super::screen::Candidate;
 use super::super::select::Selection;
-use super::{estimate, evidence};
+use super::{estimate, evidence, lens};
 use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};
 use crate::estimate::handeye::Mode;
 use crate::text;
@@ -97,15 +97,30 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
         }
         Effect::Lens => {
             let fx = model.sight.intrinsics.map_or(1.0, |camera| camera.fx);
-            let percent = 100.0 * number(0) / fx;
+            let (percent, sigma_percent) = (100.0 * number(0) / fx, 100.0 * sigma(0) / fx);
             let what = text!(
-                "The intrinsics given do not fit the images: the focal length would be {percent} % ± {sigma} % off.",
+                "The intrinsics given do not fit the images: the focal length would be {percent} % ± {sigma} % off, the \
+                 centre by {x} ± {x_sigma} px and {y} ± {y_sigma} px.",
                 percent = format!("{percent:+.2}"),
-                sigma = shown(100.0 * sigma(0) / fx, 2)
+                 sigma = shown(sigma_percent, 2),
+                 x = format!("{:+.2}", number(2)),
+                 x_sigma = shown(sigma(2), 2),
+                 y = format!("{:+.2}", number(3)),
+                 y_sigma = shown(sigma(3), 2)
             );
             numbers.push(evidence("focal_change", percent, "%"));
-            let change = estimate("focal_change", percent, Some(100.0 * sigma(0) / fx), "%");
+            let change = estimate("focal_change", percent, Some(sigma_percent), "%");
             let to_do = text!("Let them be estimated, or give those of this camera at this image size and focus.");
+            (FindingCode::WrongIntrinsics, what, to_do, change)
+        }
+        Effect::Centre => {
+            let off = [number(0), number(1)];
+            numbers.push(evidence("centre_change_x", off[0], "px"));
+            numbers.push(evidence("centre_change_y", off[1], "px"));
+            let k = usize::from(off[1].abs() > off[0].abs());
+            let name = ["centre_change_x", "centre_change_y"][k];
+            let change = estimate(name, off[k], Some(sigma(k)), "px");
+            let (what, to_do) = lens::centre(model.sight.intrinsics, off, [sigma(0), sigma(1)]);
             (FindingCode::WrongIntrinsics, what, to_do, change)
         }
         Effect::BoardMoved(from) | Effect::CameraMoved(from) => {

@@ -1,6 +1,7 @@
 //! Hypotheses and findings in words.
 
 mod fine;
+mod lens;
 
 pub(super) use fine::{finding_of, fine};
 
