@@ -91,10 +91,13 @@ impl Access {
             Self::Key { key, guesses } => {
                 let welcome = || Verdict::Welcome(format!("{KEY}={key}; HttpOnly; SameSite=Strict; Path=/"));
                 let mut guesses = guesses.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut look = |shown: &str| match shown.len() == key.len() {
-                    true => guesses.look(shown, from, now, |shown| is_same(shown, key)),
-                    // Nobody learns anything, and nothing is kept of it.
-                    false => Look::Wrong,
+                let mut look = |shown: &str| {
+                    if shown.len() == key.len() {
+                        guesses.look(shown, from, now, |shown| is_same(shown, key))
+                    } else {
+                        // Nobody learns anything, and nothing is kept of it.
+                        Look::Wrong
+                    }
                 };
                 match in_cookies(request).map_or(Look::Wrong, &mut look) {
                     Look::Right => return Verdict::Enter,

@@ -296,12 +296,13 @@ fn names_and_messages_of_strangers_command_no_terminal() {
     std::fs::create_dir(&folder).expect("made");
     std::fs::write(folder.join(format!("{evil}.csv")), "x,y\n1,2\n").expect("written");
     let driver = format!("python3 -c 'print(\"{evil}\")'");
+    let (out, none) = (home.path().join(format!("out{evil}")), folder.join("none"));
     let commands: [&[&str]; 8] = [
         &["calibrate", utf8(&folder)],
         &["doctor", utf8(&folder)],
         &["import", utf8(&folder)],
-        &["import", utf8(&folder), "--out", utf8(&home.path().join(format!("out{evil}")))],
-        &["export", utf8(&folder.join("none"))],
+        &["import", utf8(&folder), "--out", utf8(&out)],
+        &["export", utf8(&none)],
         &["driver", "test", &driver],
         &["track", "--calibration", utf8(&folder), "--connect", evil],
         &[evil],
