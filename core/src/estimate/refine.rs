@@ -264,7 +264,9 @@ pub fn judge(
     let heldout = quality::held_out(problem, solution, *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
     let widening = widening::check(problem, solution, work.cancel)?;
-    let size = size::size(problem, solution, work.cancel)?.map(|size| size.widened(widening.factor));
+    let size = size::size(problem, solution, work.cancel)?;
+    // Where the answer takes a wrong size for true its scatter is that of the size, and no reason to doubt another one.
+    let size = if problem.free.scale { size.map(|size| size.widened(widening.factor)) } else { size };
     solution.widen(&widening);
     Ok(Judged {
         heldout,
