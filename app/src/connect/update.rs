@@ -94,7 +94,7 @@ impl App {
             CellSource::Address(address) => put_first(&mut self.model.addresses, address),
             CellSource::Drivers(drivers) => put_first(&mut self.model.drivers, drivers),
         }
-        self.model.robot = None;
+        (self.model.robot, self.model.robot_read_s) = (None, None);
         self.model.frame = None;
         self.model.cell = None;
         self.model.detection = None;

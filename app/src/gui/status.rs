@@ -11,7 +11,7 @@ pub fn robot_age(model: &Model) -> Option<Text> {
     if model.is_robot_live() {
         return None;
     }
-    Some(match model.robot_read_s.filter(|_| model.robot.is_some()) {
+    Some(match model.robot_read_s {
         Some(read_s) => text!("last read {ago} ago", ago = duration(model.now_s - read_s)),
         None => text!("not read yet"),
     })

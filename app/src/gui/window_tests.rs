@@ -324,7 +324,7 @@ fn esc_stops_what_is_under_way_and_leaves_open_what_is_open() {
     let opened: [(&str, &dyn Fn(&mut Silent)); 3] = [
         ("New session…", &|silent| silent.click("Menu")),
         ("Esc stops the arm at any time", &|silent| silent.command(Command::SetDialog(Some(Dialog::Help)))),
-        ("Undo", &|silent| silent.command(Command::SetDialog(Some(Dialog::Palette)))),
+        ("Type a command", &|silent| silent.command(Command::SetDialog(Some(Dialog::Palette)))),
     ];
     for (shown, open) in opened {
         let mut model = silent.app().model().clone();

@@ -195,8 +195,9 @@ impl Done {
     pub fn stops(&self, stop: &StopPlaces) -> bool {
         let is_there = |at: [f32; 2]| place(at).is_some_and(|at| stop.rects.iter().any(|rect| rect.contains(at)));
         match self {
-            Self::Button { at, button: 0, down: true, .. } => is_there(*at),
-            Self::Touch { at, phase: Phase::Start, .. } => is_there(*at),
+            Self::Button { at, button: 0, down: true, .. } | Self::Touch { at, phase: Phase::Start, .. } => {
+                is_there(*at)
+            }
             Self::Control { id, press: true } => stop.controls.contains(id),
             Self::Key { key, down: true, .. } => {
                 named(key) == Some(STOP_KEY) || stop.has_keyboard && matches!(named(key), Some(Key::Enter | Key::Space))
