@@ -5,6 +5,7 @@ pub mod desktop;
 pub mod hostile;
 pub mod network;
 pub mod process;
+pub mod served;
 pub mod watch;
 pub mod workbench;
 

@@ -18,7 +18,7 @@ use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Sever
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, Relay, RerunChoice, WebViewer};
 use crate::settings::SettingsWrite;
 use crate::text;
-use crate::worker::{Clock, Connector, FileTask, SessionThreads, Waker, Workers};
+use crate::worker::{Clock, Connector, FileTask, SessionThreads, StopLine, Waker, Workers};
 
 pub use reach::Reach;
 
@@ -56,6 +56,8 @@ pub struct InBrowser {
     pub reach: Reach,
     /// Where the recording is found for the viewer that is shown beside it.
     pub recording: Arc<Relay>,
+    /// What stops the arm, for the threads that listen to pages.
+    pub stop: Arc<StopLine>,
 }
 
 /// Model and workers.
@@ -74,6 +76,8 @@ pub struct App {
     pub(crate) recorded: crate::rerun_log::recorded::Recorded,
     /// Until when everything has to be over, once the application ends.
     pub(crate) leave_by: Option<Instant>,
+    /// Stops of other threads that were taken note of.
+    pub(crate) outside_stops: u64,
     /// What commands may reach, if not everything.
     reach: Option<Reach>,
 }
@@ -109,7 +113,9 @@ impl App {
             waker: Arc::clone(&waker),
         })?;
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
-        let workers = Workers::start(&source, &view, &connect(&source, &objects), desk.captures(), &clock, &waker)?;
+        let stop = in_browser.as_ref().map(|shown| Arc::clone(&shown.stop)).unwrap_or_default();
+        let connector = connect(&source, &objects);
+        let workers = Workers::start(&source, &view, &connector, desk.captures(), &stop, &clock, &waker)?;
         let sessions = desk.sessions().to_path_buf();
         let shown = in_browser.is_some();
         let model = Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
@@ -129,6 +135,7 @@ impl App {
             recorder,
             recorded,
             leave_by: None,
+            outside_stops: 0,
             reach: in_browser.map(|shown| shown.reach),
         };
         if let Some(fault) = fault {
@@ -156,6 +163,7 @@ impl App {
 
     /// Takes in what the workers have reported. Never waits for them.
     pub fn collect(&mut self) {
+        self.take_outside_stops();
         self.absorb(Event::Tick { now_s: (self.clock)() });
         let mut events = Vec::new();
         self.workers.drain(|event| events.push(event));
@@ -296,6 +304,7 @@ impl App {
             Event::Robot(robot) => {
                 self.model.trail.add(robot.base_from_tip.translation().into());
                 self.model.robot = Some(robot);
+                self.model.robot_read_s = Some(self.model.now_s);
             }
             Event::NoRobot => self.model.robot = None,
             Event::Cell(facts) => self.cell_found(*facts),

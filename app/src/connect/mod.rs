@@ -5,6 +5,7 @@ pub(crate) mod drivers;
 mod objects;
 pub(crate) mod pane;
 mod scene;
+pub(crate) mod stop_line;
 pub(crate) mod update;
 pub(crate) mod worker;
 

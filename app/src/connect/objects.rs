@@ -27,7 +27,8 @@ pub(super) fn objects_ui(ui: &mut Ui, model: &Model, draft: &mut Draft, outbox: 
                 let name = name(part, language);
                 let field = form::row_ui(ui, name, |ui| {
                     let hint = if part.may_be_absent() { tr!(language, "none") } else { "" };
-                    ui.add(TextEdit::singleline(path).desired_width(ui.available_width().min(300.0)).hint_text(hint))
+                    let width = ui.available_width().min(300.0);
+                    ui.add(TextEdit::singleline(path).char_limit(400).desired_width(width).hint_text(hint))
                 });
                 let label = text!("Path: {part}", part = name).say(language);
                 field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &label));

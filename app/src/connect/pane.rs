@@ -213,7 +213,8 @@ fn address_ui(ui: &mut Ui, model: &Model, draft: &mut Draft) -> Result<CellSourc
     let before = address.clone();
     let name = tr!(language, "Address of the cell");
     let width = (ui.available_width() - 170.0).clamp(80.0, 260.0);
-    let field = ui.add(TextEdit::singleline(&mut address).desired_width(width).hint_text("tcp://host:port"));
+    let field = TextEdit::singleline(&mut address).char_limit(400).desired_width(width).hint_text("tcp://host:port");
+    let field = ui.add(field);
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, name));
     if !model.addresses.is_empty() {
         let history = ComboBox::from_id_salt("addresses").selected_text("").width(20.0).show_ui(ui, |ui| {

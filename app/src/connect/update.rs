@@ -1,5 +1,6 @@
 //! The connections to the cell.
 
+use std::sync::Arc;
 use std::thread::Builder;
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
@@ -9,7 +10,7 @@ use crate::app::App;
 use crate::connect::server_name;
 use crate::model::{ArmDoubt, BoardMotion, CellFacts, CellSource, Home, Link, LinkState, Motion, Severity, Trail};
 use crate::text::Text;
-use crate::worker::{CameraTask, ControlTask, Request, Workers};
+use crate::worker::{CameraTask, ControlTask, Request, StopLine, Workers};
 use crate::{shortfall, text};
 
 /// Earlier addresses that are offered again.
@@ -18,10 +19,35 @@ pub const ADDRESSES: usize = 8;
 impl App {
     pub(crate) fn stop(&mut self) {
         self.workers.press_stop();
+        self.stop_asked();
+    }
+
+    /// Takes note of stops that other threads have pressed. Nothing that moves begins before: a sequence would go on with
+    /// its next pose.
+    pub(crate) fn take_outside_stops(&mut self) {
+        let pressed = self.workers.stop_line().outside();
+        if std::mem::replace(&mut self.outside_stops, pressed) < pressed {
+            self.stop_asked();
+        }
+    }
+
+    /// What is asked for from now on was asked for after so many stops of other threads.
+    pub fn note_stops(&mut self, pressed: u64) {
+        self.take_outside_stops();
+        self.workers.stop_line().note(pressed);
+    }
+
+    /// What stops the arm, for other threads.
+    pub fn stop_line(&self) -> &Arc<StopLine> {
+        self.workers.stop_line()
+    }
+
+    fn stop_asked(&mut self) {
         self.model.sequence_runs = false;
         self.model.planning = false;
         self.cancel_capture();
-        self.model.stop_pending = true;
+        // It may be done already: only its report is not here yet.
+        self.model.stop_pending = self.workers.stop_line().is_pressed();
         if self.model.control.is_connected() {
             self.say(Severity::Info, text!("Stopping the arm…"));
         } else {
@@ -68,7 +94,7 @@ impl App {
             CellSource::Address(address) => put_first(&mut self.model.addresses, address),
             CellSource::Drivers(drivers) => put_first(&mut self.model.drivers, drivers),
         }
-        self.model.robot = None;
+        (self.model.robot, self.model.robot_read_s) = (None, None);
         self.model.frame = None;
         self.model.cell = None;
         self.model.detection = None;
@@ -84,7 +110,8 @@ impl App {
         self.model.mover = first;
         let connector = (self.connect)(&source, &self.model.objects);
         let captures = self.desk.captures();
-        match Workers::start(&source, &self.model.view, &connector, captures, &self.clock, &self.waker) {
+        let stop = Arc::clone(self.workers.stop_line());
+        match Workers::start(&source, &self.model.view, &connector, captures, &stop, &self.clock, &self.waker) {
             Ok(workers) => {
                 let before = std::mem::replace(&mut self.workers, workers);
                 // It waits for calls under way, which the window must not.
@@ -176,7 +203,7 @@ impl App {
                 let text = match link {
                     Link::Control => text!("Robot connection lost: {why}", why = why),
                     Link::Camera => text!("Camera connection lost: {why}", why = why),
-                    // Images and joints go on, so no strip reports it.
+                    // Images and joints go on, so no card below the steps reports it.
                     Link::Motion => {
                         let said = text!("Connection for motions lost: {why}", why = why);
                         return self.say(Severity::Warning, said);

@@ -1,52 +1,22 @@
 //! The control worker: reads the robot, starts the simulation, stops the arm.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
+use super::stop_line::StopLine;
 use crate::command::Event;
 use crate::model::{BoardMotion, CellSource, Link, RobotState, Severity, Simulation};
 use crate::text;
+use crate::worker::MAX_EVENTS;
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::port::{Connected, Connector, ControlPort, PortError};
 use crate::worker::slot::LatestSlot;
 
 /// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
 const PERIOD: Duration = Duration::from_millis(100);
-
-/// The way of a stop to the arm. It is not a message in a queue that may be full, but a count that the worker looks at
-/// before anything else, and it stays ahead until the arm has been stopped.
-#[derive(Debug, Default)]
-pub struct StopLine {
-    pressed: AtomicU64,
-    done: AtomicU64,
-}
-
-impl StopLine {
-    /// Asks for a stop.
-    pub fn press(&self) {
-        self.pressed.fetch_add(1, Ordering::AcqRel);
-    }
-
-    /// Whether a stop is asked for and not done.
-    pub fn is_pressed(&self) -> bool {
-        self.wanted().is_some()
-    }
-
-    /// The number of the newest stop that is not done.
-    fn wanted(&self) -> Option<u64> {
-        let pressed = self.pressed.load(Ordering::Acquire);
-        (pressed > self.done.load(Ordering::Acquire)).then_some(pressed)
-    }
-
-    /// Stops up to this one are done. One that was pressed meanwhile is not.
-    fn finish(&self, number: u64) {
-        self.done.fetch_max(number, Ordering::AcqRel);
-    }
-}
 
 /// What the control worker can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,7 +96,11 @@ impl Duty for Control {
             outlet.report(Event::Cell(Box::new(port.facts()?)));
         }
         for (severity, words) in port.heard() {
-            outlet.report(Event::Heard { severity, words });
+            if outlet.events.len() < MAX_EVENTS {
+                outlet.report(Event::Heard { severity, words });
+            } else {
+                tracing::warn!(?severity, words, "the window is too busy to show what a driver says");
+            }
         }
         let state = port.state()?;
         let was_known = std::mem::replace(&mut self.is_known, state.is_some());

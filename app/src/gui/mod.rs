@@ -4,7 +4,7 @@
 //! model and return commands, which it applies after the frame. A pane is a function `…_ui` without I/O, locks, sleeps
 //! or solves.
 
-mod actions;
+pub(crate) mod actions;
 mod args;
 mod arrival;
 mod dialogs;
@@ -17,9 +17,12 @@ pub(crate) mod signals;
 mod snapshot_tests;
 pub(crate) mod status;
 mod steps;
+pub(crate) mod stop_button;
 pub mod style;
 #[cfg(test)]
 pub(crate) mod testing;
+pub(crate) mod typed;
+pub(crate) mod waker;
 mod widget_list;
 pub(crate) mod window;
 
@@ -52,7 +55,6 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
     };
     let signals = signals::Signals::listen();
     let open = move |creation: &eframe::CreationContext<'_>| {
-        signals.wakes(&creation.egui_ctx);
         let (remembered, layout) = window::stored(creation.storage);
         let window = opening.window(&creation.egui_ctx, remembered, layout, None)?.that_heeds(signals);
         Ok(Box::new(window) as Box<dyn eframe::App>)

@@ -1,12 +1,13 @@
 //! What a window is opened with, on the desktop and for a browser: command line, settings, and what the last one left.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use handeye_core::plan::Surroundings;
 use handeye_sim_link::client::cell::CellPaths;
 
 use super::shell::layout::Layout;
+use super::waker::waker_of;
 use super::window::{Remembered, Window};
 use super::{GuiArgs, widget_list};
 use crate::app::{App, Connect, InBrowser, Start};
@@ -14,10 +15,7 @@ use crate::command::Event;
 use crate::model::{CellSource, Drivers};
 use crate::rerun_log::RerunChoice;
 use crate::settings::{self, Settings, SettingsFile, Warning};
-use crate::worker::{Clock, Waker};
-
-/// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
-const GATHER: Duration = Duration::from_millis(20);
+use crate::worker::Clock;
 
 /// Name of the file of boxes beside the settings.
 const KEEP_OUT_FILE: &str = "keep_out.toml";
@@ -89,8 +87,7 @@ impl Opening {
         in_browser: Option<InBrowser>,
     ) -> anyhow::Result<Window> {
         let Self { args, file, settings, warnings, source, objects } = self;
-        let woken = ctx.clone();
-        let waker: Waker = Arc::new(move || woken.request_repaint_after(GATHER));
+        let waker = waker_of(ctx)?;
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
         let connect: Connect = Arc::new(crate::connect::connector);

@@ -20,6 +20,9 @@ const ROW: f32 = 30.0;
 /// Lines that are seen at once.
 const ROWS: f32 = 11.0;
 
+/// Letters that can be typed; no command has a longer name.
+const LONGEST: usize = 64;
+
 /// What is typed and chosen.
 #[derive(Debug, Default)]
 pub struct CommandPalette {
@@ -64,7 +67,8 @@ impl CommandPalette {
         let palette = Palette::of(ui);
         ui.set_width(WIDTH);
         let hint = tr!(language, "Type a command");
-        let field = ui.add(TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(WIDTH));
+        let field =
+            ui.add(TextEdit::singleline(&mut self.typed).char_limit(LONGEST).hint_text(hint).desired_width(WIDTH));
         field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, hint));
         field.request_focus();
         if field.changed() {
@@ -179,6 +183,16 @@ mod tests {
             assert_eq!(best(typed, Language::English), Some(name), "{typed}");
         }
         assert_eq!(best("xyzzy", Language::English), None);
+    }
+
+    #[test]
+    fn no_command_has_a_longer_name_than_can_be_typed() {
+        let model = Model::new(CellSource::default(), ViewSettings::default());
+        for language in Language::ALL {
+            for action in actions::all(&model, language) {
+                assert!(action.name.chars().count() <= LONGEST, "{}", action.name);
+            }
+        }
     }
 
     #[test]

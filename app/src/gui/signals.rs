@@ -3,6 +3,8 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+use crate::worker::{StopLine, Waker};
+
 /// So long after a signal the program ends whatever it does. Who asks a program to end waits for a few seconds and then
 /// kills it.
 const LIMIT: Duration = Duration::from_millis(1900);
@@ -11,7 +13,7 @@ const LIMIT: Duration = Duration::from_millis(1900);
 #[derive(Default)]
 pub struct Signals {
     asked: OnceLock<()>,
-    ctx: OnceLock<egui::Context>,
+    heeds: OnceLock<(Arc<StopLine>, Waker)>,
 }
 
 impl Signals {
@@ -27,22 +29,52 @@ impl Signals {
 
     /// The first signal counts; others come to a thread that waits already.
     fn asked(&self) {
-        let _first = self.asked.set(()).is_ok();
-        if let Some(ctx) = self.ctx.get() {
-            ctx.request_repaint();
-        }
+        self.hear();
         std::thread::sleep(LIMIT);
         tracing::error!("the window did not close in time; what was captured is on the disk");
         std::process::exit(1);
     }
 
-    /// The window to wake up.
-    pub fn wakes(&self, ctx: &egui::Context) {
-        let _first = self.ctx.set(ctx.clone()).is_ok();
+    /// The arm is braked here: the window may be busy with a frame.
+    fn hear(&self) {
+        let _first = self.asked.set(()).is_ok();
+        if let Some((stop, waker)) = self.heeds.get() {
+            stop.press_if_moving();
+            waker();
+        }
+    }
+
+    /// What a signal stops, and the window that it wakes.
+    pub fn lead_to(&self, stop: Arc<StopLine>, waker: Waker) {
+        let _first = self.heeds.set((stop, waker)).is_ok();
     }
 
     /// Whether there was one.
     pub fn is_asked(&self) -> bool {
         self.asked.get().is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::connect::stop_line::Ends;
+    use crate::model::{MotionGoal, MotionId, MotionRequest};
+    use crate::motion::desk::{MotionQueue, MotionTask, Work};
+
+    #[test]
+    fn a_signal_ends_what_moves_whatever_the_window_does() {
+        let (stop, waker): (Arc<StopLine>, Waker) = (Arc::default(), Arc::new(|| {}));
+        let desk = Arc::new(MotionQueue::new(Arc::clone(stop.grip()), Arc::clone(&waker)));
+        let (control, _requests) = crossbeam_channel::bounded(1);
+        stop.lead_to(Ends { desk: Arc::clone(&desk), control, clock: Arc::new(|| 0.0) });
+        let signals = Signals::default();
+        signals.lead_to(Arc::clone(&stop), waker);
+        desk.connected();
+        let goal = MotionGoal::Joints([0.0; 6].into());
+        desk.ask(MotionTask::Move(MotionRequest { id: MotionId(1), goal, speed: 1.0 }), &stop);
+        let Work::Motion(_, cancel) = desk.take(0.0) else { panic!("no motion") };
+        signals.hear();
+        assert!(signals.is_asked() && cancel.is_cancelled() && stop.is_barred());
     }
 }

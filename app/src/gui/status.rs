@@ -1,12 +1,21 @@
 //! The state of the connections in words.
 
 use super::style::theme::Tone;
+pub use crate::model::STALE_AFTER_S;
 use crate::model::{CellSource, Link, LinkState, Model, Simulation};
 use crate::text;
 use crate::text::Text;
 
-/// Old enough \[s\] to say so: an image that should come many times a second.
-pub const STALE_AFTER_S: f64 = 1.0;
+/// How old what is shown of the robot is, where that is not how it is now.
+pub fn robot_age(model: &Model) -> Option<Text> {
+    if model.is_robot_live() {
+        return None;
+    }
+    Some(match model.robot_read_s {
+        Some(read_s) => text!("last read {ago} ago", ago = duration(model.now_s - read_s)),
+        None => text!("not read yet"),
+    })
+}
 
 /// A pause \[s\] that is over before it is read.
 const SOON_S: f64 = 2.0;

@@ -20,6 +20,8 @@ use super::shell::layout::STORAGE_KEY;
 use super::signals::Signals;
 use super::style::fonts;
 use super::style::theme;
+#[cfg(feature = "window")]
+use super::typed;
 use crate::app::App;
 use crate::command::{Command, Outbox};
 use crate::live::textures::Textures;
@@ -104,6 +106,7 @@ impl Window {
     #[cfg(feature = "window")]
     #[must_use]
     pub fn that_heeds(self, signals: Arc<Signals>) -> Self {
+        signals.lead_to(Arc::clone(self.app.stop_line()), Arc::clone(&self.app.waker));
         Self { signals: Some(signals), ..self }
     }
 
@@ -158,11 +161,15 @@ impl Window {
         }
     }
 
-    /// Esc stops the arm whatever else is going on, and closes what is open.
+    /// Esc stops the arm whatever else is going on. Only when there was nothing to break off, it closes what is open: who
+    /// closes a menu is not to end a sequence without knowing, and who stops an arm does not look at menus.
     fn keyboard(&mut self, ctx: &egui::Context) {
         if ctx.input(|input| input.key_pressed(actions::STOP_KEY)) {
             self.outbox.send(Command::Stop);
-            if self.app.model().dialog.is_some() {
+            if self.app.model().is_under_way() {
+                let stops = |event: &egui::Event| matches!(event, egui::Event::Key { key: actions::STOP_KEY, .. });
+                ctx.input_mut(|input| input.events.retain(|event| !stops(event)));
+            } else if self.app.model().dialog.is_some() {
                 self.outbox.send(Command::SetDialog(None));
             }
         }
@@ -272,6 +279,10 @@ fn download(folder: &Path) -> egui::OpenUrl {
 
 #[cfg(feature = "window")]
 impl eframe::App for Window {
+    fn raw_input_hook(&mut self, _ctx: &egui::Context, input: &mut egui::RawInput) {
+        typed::bound(input);
+    }
+
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.heed_signals(ctx);
         self.collect(ctx);

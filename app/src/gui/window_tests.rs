@@ -8,7 +8,9 @@ use handeye_core::targets::TargetSpec;
 use super::*;
 use crate::command::Event;
 use crate::gui::testing::{Silent, connected, frame, robot};
-use crate::model::{CellSource, Drivers, ImagePoint, Link, LinkState, Model, Pane, RotationFormat, Simulation, Step};
+use crate::model::{
+    CellSource, Drivers, ImagePoint, Link, LinkState, Model, Motion, MotionId, Pane, RotationFormat, Simulation, Step,
+};
 use crate::text::{Language, Text};
 
 #[test]
@@ -241,6 +243,71 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
     silent.press(egui::Modifiers::NONE, egui::Key::Escape);
     assert!(silent.app().model().stop_pending);
     assert!(!silent.sees("Esc stops the arm at any time"));
+}
+
+/// A connection that is lost while the arm can still be moved: the images alone, say.
+#[test]
+fn what_says_why_images_are_not_live_moves_nothing_that_moves_the_arm() {
+    let mut silent = Silent::live();
+    silent.absorb(Event::Link { link: Link::Motion, state: connected() });
+    for (pane, names) in
+        [(Pane::Jog, ["Jog joint 1 +", "Stop"].as_slice()), (Pane::Taught, &["STOP"]), (Pane::Verify, &["STOP"])]
+    {
+        silent.show(pane);
+        let places = |silent: &Silent| -> Vec<_> {
+            names.iter().map(|name| silent.harness.get_by_label(name).rect().min).collect()
+        };
+        let before = places(&silent);
+        let lost = LinkState::Lost { since_s: 88.0, why: Text::verbatim("gone"), attempt: 0, next_s: 100.0 };
+        silent.absorb(Event::Link { link: Link::Camera, state: lost });
+        assert!(silent.sees("Camera connection lost 12 s ago"));
+        assert_eq!(places(&silent), before, "{pane:?}");
+        silent.absorb(Event::Link { link: Link::Camera, state: connected() });
+    }
+}
+
+#[test]
+fn the_robot_is_grey_with_its_age_in_every_pane_once_it_is_not_read_any_more() {
+    let mut silent = Silent::live();
+    assert!(!silent.sees("last read"));
+    silent.absorb(Event::Tick { now_s: 100.0 });
+    let mut model = silent.app().model().clone();
+    model.robot_read_s = Some(80.0);
+    silent.show_model(model);
+    for pane in [Pane::Scene, Pane::Jog] {
+        silent.show(pane);
+        // In the bar at the bottom, and in the pane.
+        assert!(silent.harness.query_all_by_label_contains("last read 20 s ago").count() >= 2, "{pane:?}");
+    }
+    assert!(silent.sees("STOP") && !silent.sees("STOP cannot act"));
+    silent.links(&LinkState::Resting { why: Text::verbatim("enough") });
+    assert!(silent.sees("STOP cannot act"));
+}
+
+/// One press, one thing.
+#[test]
+fn esc_stops_what_is_under_way_and_leaves_open_what_is_open() {
+    let mut silent = Silent::live();
+    let opened: [(&str, &dyn Fn(&mut Silent)); 3] = [
+        ("New session…", &|silent| silent.click("Menu")),
+        ("Esc stops the arm at any time", &|silent| silent.command(Command::SetDialog(Some(Dialog::Help)))),
+        ("Type a command", &|silent| silent.command(Command::SetDialog(Some(Dialog::Palette)))),
+    ];
+    for (shown, open) in opened {
+        let mut model = silent.app().model().clone();
+        model.motion = Motion::Moving { id: MotionId(1), what: Text::verbatim("a pose"), since_s: 100.0 };
+        model.stop_pending = false;
+        silent.app().replace_model(model);
+        open(&mut silent);
+        silent.steps();
+        assert!(silent.sees(shown), "{shown}");
+        silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+        assert!(silent.app().model().stop_pending, "{shown}");
+        assert!(silent.sees(shown), "{shown}: it is closed as well");
+        silent.absorb(Event::Stopped);
+        silent.press(egui::Modifiers::NONE, egui::Key::Escape);
+        assert!(!silent.sees(shown), "{shown}: nothing is left to stop");
+    }
 }
 
 #[test]

@@ -148,7 +148,7 @@ fn boxes_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 fn box_ui(ui: &mut Ui, entry: &mut KeepOutBox, number: usize, language: Language) -> bool {
     let mut goes = false;
     ui.horizontal(|ui| {
-        let name = ui.add(TextEdit::singleline(&mut entry.name).desired_width(130.0));
+        let name = ui.add(TextEdit::singleline(&mut entry.name).char_limit(80).desired_width(130.0));
         let label = text!("Name of box {number}", number = number).say(language);
         name.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &label));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

@@ -5,10 +5,13 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use crate::model::workflow::Pane;
-use crate::text::Text;
+use crate::text::{Language, Text};
 
 /// Messages that are kept: a long day of work, and not a leak.
 const KEPT: usize = 2000;
+
+/// Longest message \[bytes\]: whoever reads it has read enough, and to lay text out takes time.
+const LONGEST: usize = 4000;
 
 /// How much a message matters, least first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -32,7 +35,7 @@ pub enum Home {
     Toast,
     /// A pane, which says it for as long as it is so. Below the steps only while that pane is not in front.
     Pane(Pane),
-    /// The strip over the panes, or the place of the image, until the connection is there.
+    /// The card below the steps, or the place of the image, until the connection is there.
     Connection,
 }
 
@@ -81,6 +84,7 @@ impl Messages {
 
     /// The same in a place of its own.
     pub fn say_at(&mut self, home: Home, severity: Severity, text: Text, at_s: f64) {
+        let text = shortened(text);
         if let Some(last) = self.kept.back_mut().filter(|last| last.severity == severity && last.text == text) {
             last.times += 1;
             last.at_s = at_s;
@@ -128,6 +132,15 @@ impl Messages {
             message.dismissed = true;
         }
     }
+}
+
+/// As it is, or the first part of it in English.
+fn shortened(text: Text) -> Text {
+    let said = text.say(Language::English);
+    if said.len() <= LONGEST {
+        return text;
+    }
+    Text::verbatim(format!("{}…", &said[..said.floor_char_boundary(LONGEST)]))
 }
 
 #[cfg(test)]

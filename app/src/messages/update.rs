@@ -10,7 +10,7 @@ impl App {
         self.model.messages.say_at(Home::Pane(pane), severity, text, self.model.now_s);
     }
 
-    /// Keeps what the strip over the panes says of the connection.
+    /// Keeps what the card below the steps says of the connection.
     pub(crate) fn say_of_connection(&mut self, severity: Severity, text: Text) {
         self.model.messages.say_at(Home::Connection, severity, text, self.model.now_s);
     }

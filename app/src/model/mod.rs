@@ -56,6 +56,9 @@ use crate::keep_out::state::KeepOut;
 use crate::session::start;
 use crate::text::{Language, Text};
 
+/// Old enough \[s\] to say so: an image or a reading of the robot that should come many times a second.
+pub const STALE_AFTER_S: f64 = 1.0;
+
 /// Which cell the window works with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CellSource {
@@ -301,6 +304,8 @@ pub struct Model {
     pub motion: Motion,
     /// The robot, as it was when it was last heard of.
     pub robot: Option<RobotState>,
+    /// When that was.
+    pub robot_read_s: Option<f64>,
     /// The newest images.
     pub frame: Option<LiveFrame>,
     /// Frames that arrived but were never shown, because newer ones came first.
@@ -413,6 +418,7 @@ impl Model {
             cell: None,
             motion: Motion::Idle,
             robot: None,
+            robot_read_s: None,
             frame: None,
             dropped_frames: 0,
             stop_pending: false,
@@ -474,6 +480,18 @@ impl Model {
     /// Age of the newest images \[s\].
     pub fn frame_age_s(&self) -> Option<f64> {
         self.frame.as_ref().map(|frame| (self.now_s - frame.info.received_s).max(0.0))
+    }
+
+    /// Whether what is known of the robot is so now, and not how it was when it was last read.
+    pub fn is_robot_live(&self) -> bool {
+        let is_new = |read_s: f64| self.now_s - read_s <= STALE_AFTER_S;
+        self.control.is_connected() && self.robot.is_some() && self.robot_read_s.is_none_or(is_new)
+    }
+
+    /// Whether a stop has something to break off that this program does.
+    pub fn is_under_way(&self) -> bool {
+        let follows = !matches!(self.track.follow, FollowStatus::Off | FollowStatus::Ended(_));
+        self.motion != Motion::Idle || self.sequence_runs || self.planning || self.capture.is_some() || follows
     }
 
     /// The captures and what they are for.

@@ -2,12 +2,15 @@
 //! reason, and a stop leaves nothing that could begin later.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use handeye_core::plan::Surroundings;
 use handeye_sim_link::client::CancelToken;
 
-use super::jog_line::{HELD_S, Held, JogLine};
+use super::grip::{Grip, SILENCE};
+use super::jog_line::{Held, JogLine};
 use crate::command::Event;
+use crate::connect::stop_line::StopLine;
 use crate::guided::state::GuideRequest;
 use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text;
@@ -117,23 +120,26 @@ struct Inner {
 /// Shared by the application and the motion worker.
 pub struct MotionQueue {
     inner: Mutex<Inner>,
+    grip: Arc<Grip>,
     waker: Waker,
 }
 
 impl MotionQueue {
-    /// Nothing is asked for; `waker` tells the window that something was refused.
-    pub fn new(waker: Waker) -> Self {
-        Self { inner: Mutex::default(), waker }
+    /// Nothing is asked for; `grip` knows whether what the window takes for held is held, and `waker` tells the window
+    /// that something was refused.
+    pub fn new(grip: Arc<Grip>, waker: Waker) -> Self {
+        Self { inner: Mutex::default(), grip, waker }
     }
 
     fn inner(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks for a motion; `stopping` while a stop is on its way. A refusal is reported as the end of the motion.
-    pub fn ask(&self, task: MotionTask, stopping: bool) {
+    /// Asks for a motion. A refusal is reported as the end of the motion.
+    pub fn ask(&self, task: MotionTask, stop: &StopLine) {
         let mut inner = self.inner();
-        match inner.obstacle(stopping) {
+        // Looked at here and not before: a stop that comes now cancels what is begun here.
+        match inner.obstacle(stop.is_barred()) {
             None => inner.doing = Doing::Asked(task),
             Some(why) => {
                 let outcome = MotionOutcome::Refused(why);
@@ -143,9 +149,14 @@ impl MotionQueue {
     }
 
     /// A jog button is held now. `true` when the worker has something to begin.
-    pub fn hold(&self, request: JogRequest, stopping: bool, now_s: f64) -> bool {
+    pub fn hold(&self, request: JogRequest, stop: &StopLine, now_s: f64) -> bool {
         let mut inner = self.inner();
         inner.owes_end = true;
+        // The window does not know yet that it was let go.
+        if !self.grip.is_firm(Instant::now()) {
+            return false;
+        }
+        let stopping = stop.is_barred();
         if !inner.line.hold(request, now_s) || matches!(inner.doing, Doing::Jogging) && !stopping {
             return false;
         }
@@ -239,7 +250,7 @@ impl MotionQueue {
                 inner.doing = Doing::Moving { what: task.what(), cancel: cancel.clone() };
                 Work::Motion(task, cancel)
             }
-            _ => match inner.line.request(now_s) {
+            _ => match inner.line.request(now_s).filter(|_| self.grip.is_firm(Instant::now())) {
                 Some(request) => {
                     inner.doing = Doing::Jogging;
                     inner.jog_stopped = false;
@@ -257,19 +268,28 @@ impl MotionQueue {
 
     /// Whether a jog is still held.
     pub fn is_held(&self, request: &JogRequest, now_s: f64) -> Held {
-        self.inner().line.is_held(request.jog, now_s)
+        let now = Instant::now();
+        if self.grip.is_firm(now) {
+            return self.inner().line.is_held(request.jog, now_s);
+        }
+        if self.grip.is_silent(now) { Held::Forgotten { after_s: SILENCE.as_secs_f64() } } else { Held::Released }
     }
 
-    /// A jog is over: `why` says what ended it, if that was not its button, and `forgotten` whether the window fell
-    /// silent. `None` when another button is held already, which goes on without a word.
-    pub fn end_jog(&self, request: &JogRequest, why: Option<Text>, forgotten: bool, now_s: f64) -> Option<Event> {
+    /// A jog is over: `why` says what ended it, if that was not its button, and `forgotten` after how long \[s\] in which
+    /// nothing was heard of the button. `None` when another button is held already, which goes on without a word.
+    pub fn end_jog(
+        &self,
+        request: &JogRequest,
+        why: Option<Text>,
+        forgotten: Option<f64>,
+        now_s: f64,
+    ) -> Option<Event> {
         let mut inner = self.inner();
         inner.doing = Doing::Nothing;
         let why = match why {
             Some(why) => Some(why),
             None if std::mem::take(&mut inner.jog_stopped) => Some(stopped()),
-            None if forgotten => Some(forgotten_for()),
-            None => None,
+            None => forgotten.map(forgotten_for),
         };
         inner.line.bar_jog(request.jog, now_s);
         let goes_on = why.is_none() && inner.line.request(now_s).is_some();
@@ -323,8 +343,8 @@ fn stopped() -> Text {
     text!("The arm was stopped")
 }
 
-fn forgotten_for() -> Text {
-    text!("The arm was let go: nothing was heard of the button for {seconds} s", seconds = HELD_S)
+fn forgotten_for(after_s: f64) -> Text {
+    text!("The arm was let go: nothing was heard of the button for {seconds} s", seconds = after_s)
 }
 
 #[cfg(test)]

@@ -5,9 +5,20 @@ use crate::model::Jog;
 use crate::text::Language;
 
 fn desk() -> MotionQueue {
-    let desk = MotionQueue::new(std::sync::Arc::new(|| {}));
+    let desk = MotionQueue::new(Arc::default(), Arc::new(|| {}));
     desk.connected();
     desk
+}
+
+fn free() -> StopLine {
+    StopLine::default()
+}
+
+/// A stop is on its way.
+fn pressed() -> StopLine {
+    let stop = StopLine::default();
+    stop.press();
+    stop
 }
 
 fn task(id: u64) -> MotionTask {
@@ -33,38 +44,38 @@ fn said(desk: &MotionQueue) -> Vec<(u64, String)> {
 #[test]
 fn what_comes_while_something_moves_is_refused_with_what_moves() {
     let desk = desk();
-    desk.ask(task(1), false);
-    desk.ask(task(2), false);
+    desk.ask(task(1), &free());
+    desk.ask(task(2), &free());
     assert!(matches!(desk.take(0.0), Work::Motion(MotionTask::Move(request), _) if request.id == MotionId(1)));
-    desk.ask(task(3), false);
-    desk.hold(button(0), false, 0.0);
+    desk.ask(task(3), &free());
+    desk.hold(button(0), &free(), 0.0);
     let reason = "a motion of the joints is still under way".to_owned();
     assert_eq!(said(&desk), [(2, reason.clone()), (3, reason.clone()), (0, reason)]);
     desk.done();
-    desk.hold(button(0), false, 0.1);
+    desk.hold(button(0), &free(), 0.1);
     assert!(matches!(desk.take(0.1), Work::Nothing), "the press that was refused does not begin later");
     desk.release();
     assert_eq!(said(&desk), [(0, "released".to_owned())], "it was held after its end was told");
-    desk.hold(button(0), false, 0.3);
+    desk.hold(button(0), &free(), 0.3);
     assert!(matches!(desk.take(0.3), Work::Jog(_)));
-    desk.ask(task(4), false);
+    desk.ask(task(4), &free());
     assert_eq!(said(&desk), [(4, "The arm is being jogged".to_owned())]);
 }
 
 #[test]
 fn a_stop_leaves_nothing_that_could_begin_later() {
     let desk = desk();
-    desk.ask(task(1), false);
+    desk.ask(task(1), &free());
     desk.cancel(0.0);
     assert_eq!(said(&desk), [(1, "Stopped".to_owned())]);
     assert!(matches!(desk.take(0.0), Work::Nothing));
-    desk.ask(task(2), true);
-    desk.hold(button(0), true, 0.0);
+    desk.ask(task(2), &pressed());
+    desk.hold(button(0), &pressed(), 0.0);
     let reason = "The arm is being stopped".to_owned();
     assert_eq!(said(&desk), [(2, reason.clone()), (0, reason)]);
     assert!(matches!(desk.take(0.0), Work::Nothing));
     desk.release();
-    desk.hold(button(0), false, 0.2);
+    desk.hold(button(0), &free(), 0.2);
     desk.cancel(0.2);
     assert_eq!(said(&desk), [(0, "The arm was stopped".to_owned())]);
     assert!(matches!(desk.take(0.2), Work::Nothing));
@@ -73,7 +84,7 @@ fn a_stop_leaves_nothing_that_could_begin_later() {
 #[test]
 fn a_stop_cancels_the_motion_under_way() {
     let desk = desk();
-    desk.ask(task(1), false);
+    desk.ask(task(1), &free());
     let Work::Motion(_, cancel) = desk.take(0.0) else { panic!("no motion") };
     assert!(!cancel.is_cancelled());
     desk.cancel(0.0);
@@ -84,38 +95,36 @@ fn a_stop_cancels_the_motion_under_way() {
 #[test]
 fn a_jog_is_told_to_have_ended_once_and_with_its_reason() {
     let desk = desk();
-    desk.hold(button(0), false, 0.0);
+    desk.hold(button(0), &free(), 0.0);
     assert!(matches!(desk.take(0.0), Work::Jog(_)));
     desk.cancel(0.1);
     assert_eq!(desk.is_held(&button(0), 0.1), Held::Released);
-    let Some(Event::JogEnded { why: Some(why) }) = desk.end_jog(&button(0), None, false, 0.2) else {
-        panic!("no word")
-    };
+    let Some(Event::JogEnded { why: Some(why) }) = desk.end_jog(&button(0), None, None, 0.2) else { panic!("no word") };
     assert_eq!(why.say(Language::English), "The arm was stopped");
-    desk.hold(button(0), false, 0.25);
+    desk.hold(button(0), &free(), 0.25);
     assert!(matches!(desk.take(0.25), Work::Nothing), "it has been held all the time");
 
     desk.release();
     said(&desk);
-    desk.hold(button(0), false, 0.4);
+    desk.hold(button(0), &free(), 0.4);
     desk.release();
     assert_eq!(said(&desk), [(0, "released".to_owned())], "also when the worker was not quick enough to see it");
-    desk.hold(button(1), false, 1.0);
+    desk.hold(button(1), &free(), 1.0);
     assert!(matches!(desk.take(1.0), Work::Jog(_)));
-    desk.hold(button(2), false, 1.1);
+    desk.hold(button(2), &free(), 1.1);
     assert_eq!(desk.is_held(&button(1), 1.1), Held::Released);
-    assert!(desk.end_jog(&button(1), None, false, 1.1).is_none(), "the next one goes on");
+    assert!(desk.end_jog(&button(1), None, None, 1.1).is_none(), "the next one goes on");
     assert!(matches!(desk.take(1.1), Work::Jog(request) if request == button(2)));
-    let end = desk.end_jog(&button(2), None, true, 2.0);
+    let end = desk.end_jog(&button(2), None, Some(0.3), 2.0);
     assert!(matches!(end, Some(Event::JogEnded { why: Some(_) })), "the window fell silent");
 }
 
 #[test]
 fn a_connection_that_goes_takes_what_was_not_begun_with_it() {
     let desk = desk();
-    desk.ask(task(1), false);
+    desk.ask(task(1), &free());
     desk.disconnected(0.0);
-    desk.ask(task(2), false);
+    desk.ask(task(2), &free());
     let reason = "There is no connection that moves the arm".to_owned();
     assert_eq!(said(&desk), [(1, reason.clone()), (2, reason)]);
     desk.connected();
@@ -134,7 +143,7 @@ fn every_motion_has_one_end_in_every_order_of_events() {
             match order / 4_u32.pow(step) % 4 {
                 0 => {
                     asked += 1;
-                    desk.ask(task(asked), false);
+                    desk.ask(task(asked), &free());
                 }
                 1 => desk.cancel(0.0),
                 2 if running.is_none() => {
@@ -166,7 +175,7 @@ fn every_motion_has_one_end_in_every_order_of_events() {
 
 #[test]
 fn what_the_arm_keeps_out_of_is_told_once_for_each_change_and_each_connection() {
-    let queue = MotionQueue::new(Arc::new(|| {}));
+    let queue = MotionQueue::new(Arc::default(), Arc::new(|| {}));
     assert!(queue.take_keep_out().is_none(), "there is nothing to keep out of and nobody to tell");
     let keep_out = Arc::new(Surroundings::default());
     queue.keep_out(Arc::clone(&keep_out));

@@ -14,8 +14,11 @@ pub enum Held {
     Yes(f64),
     /// It was let go, or another one is held instead.
     Released,
-    /// Nobody has said for too long that it is held.
-    Forgotten,
+    /// Nobody has said that it is held.
+    Forgotten {
+        /// For so long \[s\].
+        after_s: f64,
+    },
 }
 
 /// The button that is held, and one that may do nothing more until it is let go.
@@ -83,7 +86,7 @@ impl JogLine {
     /// Whether a jog is still held.
     pub fn is_held(&mut self, jog: Jog, now_s: f64) -> Held {
         if self.held.take_if(|held| now_s > held.until_s).is_some() {
-            return Held::Forgotten;
+            return Held::Forgotten { after_s: HELD_S };
         }
         match &self.held {
             Some(held) if held.request.jog == jog => Held::Yes(held.request.speed),
@@ -106,7 +109,7 @@ mod tests {
         assert!(line.hold(request(0), 1.0));
         assert!(line.hold(request(0), 1.2), "it is extended");
         assert_eq!(line.is_held(request(0).jog, 1.49), Held::Yes(0.5));
-        assert_eq!(line.is_held(request(0).jog, 1.51), Held::Forgotten);
+        assert_eq!(line.is_held(request(0).jog, 1.51), Held::Forgotten { after_s: HELD_S });
         assert_eq!(line.is_held(request(0).jog, 1.52), Held::Released);
     }
 

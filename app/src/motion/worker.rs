@@ -138,12 +138,12 @@ impl Motions {
     }
 
     fn jog(&self, port: &mut dyn MotionPort, request: &JogRequest, outlet: &Outlet) -> Result<(), PortError> {
-        let mut forgotten = false;
+        let mut forgotten = None;
         let mut held = || match self.desk.is_held(request, outlet.now_s()) {
             Held::Yes(speed) => Some(speed),
             Held::Released => None,
-            Held::Forgotten => {
-                forgotten = true;
+            Held::Forgotten { after_s } => {
+                forgotten = Some(after_s);
                 None
             }
         };

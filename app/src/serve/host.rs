@@ -9,7 +9,7 @@ use egui::{Event, OutputCommand, Pos2, RawInput, Rect, Vec2, ViewportCommand, Vi
 use super::chunks;
 use super::frame::{Frame, Typing, cursor_name};
 use super::hub::{Errand, Hub, Words};
-use super::input::{Held, Screen};
+use super::input::{Held, Screen, lets_go};
 use super::memory::Memory;
 use super::reading;
 use super::textures::Textures;
@@ -17,8 +17,10 @@ use crate::app::InBrowser;
 use crate::command::Command;
 use crate::gui::opening::Opening;
 use crate::gui::signals::Signals;
+use crate::gui::stop_button::stop_places;
 use crate::gui::style::theme;
-use crate::gui::{LEAST_SIZE, SIZE, Window};
+use crate::gui::{LEAST_SIZE, SIZE, Window, typed};
+use crate::motion::grip::{Grip, SILENCE, Times};
 use crate::text::Language;
 use crate::tr;
 
@@ -33,10 +35,6 @@ const PERIOD_OF_INPUT: Duration = Duration::from_millis(8);
 
 /// What happened is taken in at least this often, also when nobody looks.
 const COLLECT: Duration = Duration::from_millis(250);
-
-/// What is held down moves nothing any more when the page was not heard for so long. Pages say it every 80 ms: three are
-/// missed before, and with the way to the arm it stands within half a second.
-const SILENCE: Duration = Duration::from_millis(260);
 
 /// What is pressed and released within it is a click \[s\]. On its way a release may be late by what a network needs to send
 /// it again.
@@ -68,6 +66,13 @@ pub struct Host {
     held: Held,
     /// Something is held at a page that was not heard for too long.
     is_silent: bool,
+    /// It was not heard for too long since a frame was drawn.
+    was_silent: bool,
+    grip: Arc<Grip>,
+    /// How often what is held was let go, with what was taken in.
+    times: Times,
+    /// How often STOP was pressed, with what was taken in.
+    stops: u64,
     must_draw: bool,
     events: Vec<Event>,
     textures: Textures,
@@ -96,10 +101,12 @@ impl Host {
                 woken.wake();
             }
         });
-        signals.wakes(&ctx);
         let memory = Memory::open();
         let (remembered, layout) = memory.last();
-        let window = opening.window(&ctx, remembered, layout, Some(shown))?;
+        let mut window = opening.window(&ctx, remembered, layout, Some(shown))?;
+        let app = window.app_mut();
+        signals.lead_to(Arc::clone(app.stop_line()), Arc::clone(&app.waker));
+        let grip = Arc::clone(app.stop_line().grip());
         let now = Instant::now();
         Ok(Self {
             ctx,
@@ -117,6 +124,10 @@ impl Host {
             screen: None,
             held: Held::default(),
             is_silent: false,
+            was_silent: false,
+            grip,
+            times: Times::default(),
+            stops: 0,
             must_draw: false,
             events: Vec::new(),
             textures: Textures::default(),
@@ -130,9 +141,6 @@ impl Host {
         loop {
             let wait = self.wait();
             let _woken = self.wakes.recv_timeout(wait).is_ok();
-            if self.hub.take_stop() {
-                self.window.app_mut().apply(Command::Stop);
-            }
             if self.signals.is_asked() {
                 break;
             }
@@ -177,7 +185,7 @@ impl Host {
     }
 
     fn take_in(&mut self) -> std::ops::ControlFlow<()> {
-        let (news, heard) = self.hub.news();
+        let news = self.hub.news();
         if let Some(screen) = news.screen {
             if self.screen.is_some_and(|before| before.touch) != screen.touch {
                 theme::for_fingers(&self.ctx, screen.touch);
@@ -186,10 +194,18 @@ impl Host {
             sooner(&self.due, Duration::ZERO);
         }
         if news.changed_hands {
+            self.events.clear();
             self.events.extend(self.held.release());
             sooner(&self.due, Duration::ZERO);
         }
-        let is_silent = self.held.is_any() && heard.elapsed() > SILENCE;
+        if news.stops > self.stops {
+            self.stops = news.stops;
+            self.window.app_mut().note_stops(news.stops);
+        }
+        // A silence that is over by now has let go all the same, and a frame has to show so.
+        self.was_silent |= self.held.is_any() && news.times.silent > self.times.silent;
+        self.times = news.times;
+        let is_silent = self.held.is_any() && (self.was_silent || self.grip.is_silent(Instant::now()));
         if is_silent != self.is_silent {
             tracing::debug!(is_silent, "something is held at a page");
             self.is_silent = is_silent;
@@ -245,6 +261,10 @@ impl Host {
         if !self.events.is_empty() {
             sooner(&self.due, Duration::ZERO);
         }
+        if !self.events.iter().any(lets_go) {
+            self.grip.know(self.times);
+        }
+        self.was_silent = false;
         let window = &mut self.window;
         let is_read = self.hub.is_read_at_all();
         if is_read {
@@ -253,6 +273,7 @@ impl Host {
             self.ctx.disable_accesskit();
         }
         let mut output = self.ctx.run_ui(input, |ui| window.window_ui(ui));
+        self.hub.stops_at(stop_places(&self.ctx));
         self.textures.change(&mut output.textures_delta);
         let platform = output.platform_output;
         if is_read && let Some(update) = &platform.accesskit_update {
@@ -314,6 +335,7 @@ impl Host {
             focused: !self.is_silent,
             ..RawInput::default()
         };
+        typed::bound(&mut input);
         if let Some(viewport) = input.viewports.get_mut(&ViewportId::ROOT) {
             viewport.native_pixels_per_point = Some(scale);
             viewport.inner_rect = input.screen_rect;
@@ -352,7 +374,11 @@ fn words(language: Language) -> Words {
         nobody: say(tr!(language, "Nobody drives")),
         drive: say(tr!(language, "Drive")),
         stop: say(tr!(language, "STOP")),
-        lost: say(tr!(language, "The connection is lost; trying again…")),
+        lost: say(tr!(
+            language,
+            "The connection to the workbench is lost. What is shown is of {time}, and STOP does not act from here: use the emergency \
+             stop of the robot"
+        )),
         uploading: say(tr!(language, "Uploading…")),
         not_uploaded: say(tr!(language, "The files could not be uploaded")),
         reads: say(tr!(language, "Controls for a screen reader")),

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -13,6 +12,9 @@ use tokio::sync::watch;
 use super::frame::Frame;
 use super::input::{Done, Screen};
 use super::reading::Control;
+use crate::gui::stop_button::StopPlaces;
+use crate::motion::grip::{Grip, Times};
+use crate::worker::StopLine;
 
 /// Pages at a time.
 pub const MOST_PAGES: usize = 32;
@@ -27,7 +29,7 @@ pub type PageId = u64;
 pub struct Hub {
     state: Mutex<State>,
     wake: Sender<()>,
-    stop: AtomicBool,
+    stop: Arc<StopLine>,
     frames: watch::Sender<(u64, Arc<Frame>)>,
     people: watch::Sender<People>,
     words: watch::Sender<Words>,
@@ -56,7 +58,7 @@ pub struct Words {
     pub drive: String,
     /// The button that stops the arm.
     pub stop: String,
-    /// The connection is gone.
+    /// The connection is gone; `{time}` is when the server was last heard.
     pub lost: String,
     /// Files are on their way.
     pub uploading: String,
@@ -93,6 +95,10 @@ pub struct News {
     pub changed_hands: bool,
     /// Uploads that are to be opened.
     pub opened: Vec<PathBuf>,
+    /// How often STOP was pressed so far. What was done before the last time is not here any more.
+    pub stops: u64,
+    /// How often what is held was let go so far, with what is here.
+    pub times: Times,
 }
 
 struct State {
@@ -100,8 +106,8 @@ struct State {
     pages: BTreeMap<PageId, Page>,
     driver: Option<PageId>,
     news: News,
-    /// When the page that drives was last heard.
-    heard: Instant,
+    /// Where STOP is on the page that drives.
+    stop_places: StopPlaces,
 }
 
 struct Page {
@@ -122,14 +128,14 @@ const MOST_ERRANDS: usize = 16;
 
 impl Hub {
     /// Nobody is there; what wakes the window comes out of the second.
-    pub fn new() -> (Self, Receiver<()>) {
+    pub fn new(stop: Arc<StopLine>) -> (Self, Receiver<()>) {
         let (wake, wakes) = crossbeam_channel::bounded(1);
-        let state =
-            State { next: 1, pages: BTreeMap::new(), driver: None, news: News::default(), heard: Instant::now() };
+        let (news, stop_places) = (News::default(), StopPlaces::default());
+        let state = State { next: 1, pages: BTreeMap::new(), driver: None, news, stop_places };
         let hub = Self {
             state: Mutex::new(state),
             wake,
-            stop: AtomicBool::new(false),
+            stop,
             frames: watch::Sender::default(),
             people: watch::Sender::default(),
             words: watch::Sender::default(),
@@ -173,7 +179,7 @@ impl Hub {
             Page { name: name.to_owned(), screen: None, visible: true, reads: false, ready: true, errands },
         );
         if drove || state.driver.is_none() {
-            state.take_over(id);
+            state.take_over(id, self.stop.grip());
         }
         self.tell_people(&state);
         drop(state);
@@ -187,8 +193,7 @@ impl Hub {
         state.pages.remove(&id);
         if state.driver == Some(id) {
             state.driver = None;
-            state.news.done.clear();
-            state.news.changed_hands = true;
+            state.let_go_all(self.stop.grip());
         }
         self.tell_people(&state);
         drop(state);
@@ -204,29 +209,39 @@ impl Hub {
     pub fn drive(&self, id: PageId) {
         let mut state = self.state();
         if state.pages.contains_key(&id) && state.driver != Some(id) {
-            state.take_over(id);
+            state.take_over(id, self.stop.grip());
             self.tell_people(&state);
         }
         drop(state);
         self.wake();
     }
 
-    /// Stops the arm, whoever asks for it.
+    /// Stops the arm, whoever asks for it. The window learns of it when it has time.
     pub fn stop(&self) {
-        self.stop.store(true, Ordering::Release);
+        let number = self.stop.press_outside();
+        self.state().stopped(number, self.stop.grip());
         self.wake();
     }
 
-    /// Whether the arm is to stop; once for every time that it was asked for.
-    pub fn take_stop(&self) -> bool {
-        self.stop.swap(false, Ordering::AcqRel)
+    /// Where STOP is on the page that drives.
+    pub fn stops_at(&self, places: StopPlaces) {
+        self.state().stop_places = places;
     }
 
     /// The page that drives was heard.
     pub fn held(&self, id: PageId) {
+        if self.state().driver == Some(id) {
+            self.stop.grip().hear(Instant::now());
+        }
+    }
+
+    /// Nothing is held at a page any more.
+    pub fn let_go(&self, id: PageId) {
         let mut state = self.state();
         if state.driver == Some(id) {
-            state.heard = Instant::now();
+            state.let_go_all(self.stop.grip());
+            drop(state);
+            self.wake();
         }
     }
 
@@ -237,11 +252,20 @@ impl Hub {
     pub fn done(&self, id: PageId, done: Vec<Done>) -> Result<(), TooMuch> {
         let mut state = self.state();
         if state.driver == Some(id) {
-            state.heard = Instant::now();
+            self.stop.grip().hear(Instant::now());
             if state.news.done.len() + done.len() > MOST_EVENTS {
                 return Err(TooMuch);
             }
-            state.news.done.extend(done);
+            for done in done {
+                if done.stops(&state.stop_places) {
+                    let number = self.stop.press_outside();
+                    state.stopped(number, self.stop.grip());
+                }
+                if done.lets_go() {
+                    self.stop.grip().let_go();
+                }
+                state.news.done.push(done);
+            }
             drop(state);
             self.wake();
         }
@@ -327,10 +351,12 @@ impl Hub {
         self.state().pages.values().any(|page| page.visible && page.ready)
     }
 
-    /// What happened since the last time, and when the page that drives was last heard.
-    pub fn news(&self) -> (News, Instant) {
+    /// What happened since the last time.
+    pub fn news(&self) -> News {
         let mut state = self.state();
-        (std::mem::take(&mut state.news), state.heard)
+        let next = News { stops: state.news.stops, ..News::default() };
+        let news = std::mem::replace(&mut state.news, next);
+        News { times: self.stop.grip().times(Instant::now()), ..news }
     }
 
     /// Shows a frame to everybody.
@@ -376,12 +402,24 @@ impl Hub {
 }
 
 impl State {
-    fn take_over(&mut self, id: PageId) {
+    fn take_over(&mut self, id: PageId, grip: &Grip) {
         self.driver = Some(id);
+        self.let_go_all(grip);
+        grip.hear(Instant::now());
+        self.news.screen = self.pages.get(&id).and_then(|page| page.screen);
+    }
+
+    /// Nothing is held any more, and what was done before does not count.
+    fn let_go_all(&mut self, grip: &Grip) {
+        grip.let_go();
         self.news.done.clear();
         self.news.changed_hands = true;
-        self.heard = Instant::now();
-        self.news.screen = self.pages.get(&id).and_then(|page| page.screen);
+    }
+
+    /// STOP was pressed, so often by now: what was asked for before it is not begun after it.
+    fn stopped(&mut self, number: u64, grip: &Grip) {
+        self.let_go_all(grip);
+        self.news.stops = self.news.stops.max(number);
     }
 }
 
@@ -395,7 +433,7 @@ mod tests {
     use super::*;
 
     fn hub() -> Hub {
-        Hub::new().0
+        Hub::new(Arc::default()).0
     }
 
     fn join(hub: &Hub, name: &str) -> PageId {
@@ -412,22 +450,42 @@ mod tests {
         let (first, second) = (join(&hub, "a"), join(&hub, "b"));
         assert_eq!(driver(&hub), Some(first));
         hub.done(second, vec![Done::Leave]).expect("ignored");
-        assert!(hub.news().0.done.is_empty(), "who watches does nothing");
+        assert!(hub.news().done.is_empty(), "who watches does nothing");
         hub.drive(second);
         assert_eq!(driver(&hub), Some(second));
-        let (news, _) = hub.news();
+        let news = hub.news();
         assert!(news.changed_hands && news.done.is_empty());
         hub.done(second, vec![Done::Leave]).expect("room");
-        assert_eq!(hub.news().0.done, [Done::Leave]);
+        assert_eq!(hub.news().done, [Done::Leave]);
     }
 
     #[test]
     fn everybody_stops_the_arm_also_who_only_watches() {
         let hub = hub();
         let (_first, _second) = (join(&hub, "a"), join(&hub, "b"));
-        assert!(!hub.take_stop());
+        assert!(!hub.stop.is_pressed());
         hub.stop();
-        assert!(hub.take_stop() && !hub.take_stop());
+        assert!(hub.stop.is_pressed(), "and waits for no window");
+        assert_eq!((hub.news().stops, hub.news().stops), (1, 1));
+    }
+
+    #[test]
+    fn what_was_done_before_a_stop_is_not_done_after_it() {
+        let hub = hub();
+        let page = join(&hub, "a");
+        hub.news();
+        hub.done(page, vec![Done::Copy]).expect("room");
+        hub.stop();
+        hub.done(page, vec![Done::Leave]).expect("room");
+        let news = hub.news();
+        assert_eq!((news.done, news.changed_hands, news.stops), (vec![Done::Leave], true, 1));
+        // STOP on the page itself is recognised where it is drawn, and what comes before it in the same message does not count.
+        let rects = vec![egui::Rect::from_min_size(egui::Pos2::ZERO, egui::Vec2::splat(10.0))];
+        hub.stops_at(StopPlaces { rects, ..StopPlaces::default() });
+        let press = Done::Button { at: [5.0, 5.0], button: 0, down: true, modifiers: 0 };
+        hub.done(page, vec![Done::Copy, press.clone()]).expect("room");
+        let news = hub.news();
+        assert_eq!((news.done, news.stops), (vec![press], 2));
     }
 
     #[test]
@@ -442,7 +500,7 @@ mod tests {
         // Nobody is made to drive when the driver leaves: moving an arm is something that one wants to do.
         hub.leave(again);
         assert_eq!(driver(&hub), None);
-        assert!(hub.news().0.changed_hands);
+        assert!(hub.news().changed_hands);
     }
 
     #[test]

@@ -6,6 +6,8 @@ use egui::{
 use serde::Deserialize;
 
 use super::reading;
+use crate::gui::actions::STOP_KEY;
+use crate::gui::stop_button::StopPlaces;
 
 /// Sizes of a page that are drawn for \[points\].
 const SIZES: std::ops::RangeInclusive<f32> = 100.0..=8192.0;
@@ -189,6 +191,31 @@ fn place([x, y]: [f32; 2]) -> Option<Pos2> {
 }
 
 impl Done {
+    /// Whether it presses STOP, wherever that is. It counts when it goes down: nobody has to let it go to stop the arm.
+    pub fn stops(&self, stop: &StopPlaces) -> bool {
+        let is_there = |at: [f32; 2]| place(at).is_some_and(|at| stop.rects.iter().any(|rect| rect.contains(at)));
+        match self {
+            Self::Button { at, button: 0, down: true, .. } | Self::Touch { at, phase: Phase::Start, .. } => {
+                is_there(*at)
+            }
+            Self::Control { id, press: true } => stop.controls.contains(id),
+            Self::Key { key, down: true, .. } => {
+                named(key) == Some(STOP_KEY) || stop.has_keyboard && matches!(named(key), Some(Key::Enter | Key::Space))
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether something that was held may be held no more.
+    pub fn lets_go(&self) -> bool {
+        match self {
+            Self::Button { down, .. } | Self::Key { down, .. } => !down,
+            Self::Touch { phase, .. } => matches!(phase, Phase::End | Phase::Cancel),
+            Self::Leave | Self::Focus { focused: false } => true,
+            _ => false,
+        }
+    }
+
     /// Adds the events that it means. What makes no sense means nothing.
     pub fn add_to(self, events: &mut Vec<Event>) {
         match self {
@@ -331,6 +358,16 @@ impl Held {
     }
 }
 
+/// Whether something that was held may be held no more, as the window hears of it.
+pub fn lets_go(event: &Event) -> bool {
+    match event {
+        Event::PointerButton { pressed, .. } | Event::Key { pressed, .. } => !pressed,
+        Event::Touch { phase, .. } => matches!(phase, TouchPhase::End | TouchPhase::Cancel),
+        Event::PointerGone | Event::WindowFocused(false) => true,
+        _ => false,
+    }
+}
+
 fn note<T: PartialEq>(held: &mut Vec<T>, what: T, is_down: bool) {
     held.retain(|held| *held != what);
     if is_down {
@@ -366,6 +403,37 @@ mod tests {
         };
         assert_eq!((*pos, *button, *pressed), (Pos2::new(3.0, 4.0), PointerButton::Primary, true));
         assert!(modifiers.ctrl && modifiers.command && !modifiers.shift);
+    }
+
+    #[test]
+    fn stop_is_recognised_by_its_place_its_number_and_its_keys() {
+        let places = StopPlaces {
+            rects: vec![egui::Rect::from_min_size(Pos2::new(10.0, 10.0), Vec2::splat(20.0))],
+            controls: vec!["17".to_owned()],
+            has_keyboard: false,
+        };
+        let stops = |json: &str, places: &StopPlaces| {
+            let Said::Input { events } = said(&format!(r#"{{"t":"input","events":[{json}]}}"#)) else {
+                panic!("{json}")
+            };
+            events.iter().any(|done| done.stops(places))
+        };
+        for (json, is_stop) in [
+            (r#"{"e":"button","at":[12,12],"button":0,"down":true,"modifiers":0}"#, true),
+            (r#"{"e":"button","at":[12,12],"button":0,"down":false,"modifiers":0}"#, false),
+            (r#"{"e":"button","at":[12,12],"button":2,"down":true,"modifiers":0}"#, false),
+            (r#"{"e":"button","at":[12,31],"button":0,"down":true,"modifiers":0}"#, false),
+            (r#"{"e":"touch","id":4,"at":[29,29],"phase":"start","first":false}"#, true),
+            (r#"{"e":"touch","id":4,"at":[29,29],"phase":"move","first":true}"#, false),
+            (r#"{"e":"control","id":"17","press":true}"#, true),
+            (r#"{"e":"control","id":"17","press":false}"#, false),
+            (r#"{"e":"key","key":"Escape","down":true,"modifiers":4}"#, true),
+            (r#"{"e":"key","key":"Enter","down":true,"modifiers":0}"#, false),
+        ] {
+            assert_eq!(stops(json, &places), is_stop, "{json}");
+        }
+        let focused = StopPlaces { has_keyboard: true, ..places };
+        assert!(stops(r#"{"e":"key","key":"Enter","down":true,"modifiers":0}"#, &focused));
     }
 
     #[test]

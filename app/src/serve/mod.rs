@@ -62,7 +62,8 @@ pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
     let mut folders = vec![opening.sessions()];
     folders.extend(opening.session().map(std::path::Path::to_path_buf));
     folders.extend(allow);
-    let shown = InBrowser { reach: Reach::new(folders).with_drivers(opening.drivers()), recording: Arc::default() };
+    let reach = Reach::new(folders).with_drivers(opening.drivers());
+    let shown = InBrowser { reach, recording: Arc::default(), stop: Arc::default() };
 
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)
@@ -70,7 +71,7 @@ pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
         .enable_all()
         .build()
         .context("there are no threads to serve from")?;
-    let (hub, wakes) = Hub::new();
+    let (hub, wakes) = Hub::new(Arc::clone(&shown.stop));
     let hub = Arc::new(hub);
     let site = Site::new(access, Arc::clone(&hub), shown.clone(), &opening.sessions());
     let site = Arc::new(site);

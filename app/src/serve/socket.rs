@@ -1,6 +1,7 @@
 //! The connection of a page: frames and words one way, what a person does the other way.
 //!
-//! Two tasks, so that a page that takes its frames slowly is heard all the same: a STOP waits for no frame.
+//! Two tasks, so that a page that takes its frames slowly is heard all the same: a STOP waits for no frame, neither for one
+//! that is sent nor for one that is drawn.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,13 +23,16 @@ use super::reading::Control;
 use super::upload::Uploads;
 
 /// Longest message of a page \[bytes\]: what is pasted is in it.
-const MOST_BYTES: usize = 1 << 20;
+const MOST_BYTES: usize = 64 << 10;
 
 /// Frames on their way to a page. With one, the page would wait for the next after every one.
 const ON_THE_WAY: u64 = 2;
 
 /// How often a page is asked whether it is there.
 const PING: Duration = Duration::from_secs(5);
+
+/// How often a page is told that the server is there: what it shows is not live when it hears nothing.
+const ALIVE: Duration = Duration::from_secs(1);
 
 /// A page of which nothing was heard for so long is gone.
 const GONE: Duration = Duration::from_secs(15);
@@ -51,6 +55,8 @@ enum Told<'a> {
     },
     /// What there is, for a screen reader.
     Controls { controls: &'a [Control] },
+    /// The server is there, also when there is nothing new.
+    Alive,
 }
 
 /// Talks to a page until it has gone.
@@ -103,7 +109,12 @@ async fn read(
             Said::Shown { number } => {
                 shown.send_replace(number);
             }
-            Said::Visible { visible } => hub.sees(id, Some(visible), None),
+            Said::Visible { visible } => {
+                if !visible {
+                    hub.let_go(id);
+                }
+                hub.sees(id, Some(visible), None);
+            }
             Said::Reads { reads } => hub.reads(id, reads),
             Said::Held => hub.held(id),
             Said::Stop => hub.stop(),
@@ -129,7 +140,7 @@ async fn write(
     people.mark_changed();
     words.mark_changed();
     let mut controls = hub.controls();
-    let mut pings = interval(PING);
+    let (mut pings, mut alive) = (interval(PING), interval(ALIVE));
     let mut page = Shown::default();
     let (mut sent, mut last) = (0, 0);
     let mut taken = Instant::now();
@@ -183,8 +194,16 @@ async fn write(
                 }
                 last = number;
                 sent += 1;
-                Message::binary(page.message(sent, &frame))
+                // Elsewhere: the threads that listen to pages have no time for it.
+                let told = tokio::task::spawn_blocking(move || {
+                    let message = page.message(sent, &frame);
+                    (page, message)
+                });
+                let Ok((after, message)) = told.await else { return "failed" };
+                page = after;
+                Message::binary(message)
             }
+            _ = alive.tick() => json(&Told::Alive),
             _ = pings.tick() => {
                 if !has_room && taken.elapsed() > STALLED {
                     return "stalled";

@@ -17,7 +17,7 @@ use nalgebra::Isometry3;
 use super::port::{
     CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, PortError, RawFrame, Room, ViewsRequest,
 };
-use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Simulation};
+use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Severity, Simulation};
 use crate::text;
 use crate::text::Text;
 
@@ -70,6 +70,10 @@ pub struct Script {
     pub board: BoardMotion,
     /// Whether it was told to hide.
     pub board_hidden: bool,
+    /// Lines that it says whenever it is asked.
+    pub lines: usize,
+    /// How often it was asked for them.
+    pub asked_for_lines: usize,
 }
 
 /// A cell that tests control. Clones are the same cell.
@@ -99,6 +103,8 @@ impl FakeCell {
             jogged: Vec::new(),
             board: BoardMotion::default(),
             board_hidden: false,
+            lines: 0,
+            asked_for_lines: 0,
         };
         Self { script: Arc::new(Mutex::new(script)), hang: None }
     }
@@ -224,6 +230,12 @@ impl ControlPort for FakeCell {
     fn hide_board(&mut self, hidden: bool) -> Result<(), PortError> {
         self.answer()?.board_hidden = hidden;
         Ok(())
+    }
+
+    fn heard(&mut self) -> Vec<(Severity, String)> {
+        let mut script = self.script();
+        script.asked_for_lines += 1;
+        vec![(Severity::Info, "a line".to_owned()); script.lines]
     }
 }
 

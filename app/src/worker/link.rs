@@ -24,8 +24,9 @@ pub enum Request<Task> {
 /// Where a worker reports to.
 #[derive(Clone)]
 pub struct Outlet {
-    /// Changes of state, in order. A window that does not look (it may be hidden) makes the worker wait here once the
-    /// channel is full, which harms nobody; the channel closes when the application ends.
+    /// Changes of state, in order. A window that does not look (it may be hidden, or busy with a frame) makes the worker
+    /// wait here once the channel is full. That of the control worker is never full: a stop waits for no window. The channel
+    /// closes when the application ends.
     pub events: Sender<Event>,
     /// Tells the window to look.
     pub waker: Waker,

@@ -299,9 +299,82 @@ fn a_server_that_ends_between_two_calls_is_noticed_at_once() {
     assert!(began.elapsed() < Duration::from_secs(3), "{:?}", began.elapsed());
 }
 
-/// Moves in real time through a whole sequence, twice.
+/// Moves in real time.
 mod slow {
     use super::*;
+
+    /// From a stop to an arm at rest, by the clock of the cell \[s\].
+    const AT_REST_S: f64 = 0.3;
+
+    /// As the window moves the built-in cell. From twice of it the arm needs those 0.3 s to brake as hard as it may.
+    const SPEED: f64 = 0.5;
+
+    impl Live {
+        fn time_s(&mut self) -> f64 {
+            self.watch.sim().get_simulation_time().expect("a call")
+        }
+
+        /// When the arm has last moved, once it has stood for ten passes.
+        fn last_moved_s(&mut self) -> f64 {
+            let (mut joints, mut moved_s) = (self.joints(), self.time_s());
+            loop {
+                let (now, now_s) = (self.joints(), self.time_s());
+                if now != joints {
+                    (joints, moved_s) = (now, now_s);
+                }
+                if now_s - moved_s > 0.5 {
+                    return moved_s;
+                }
+            }
+        }
+    }
+
+    /// The worst frame is one that does not end: nobody takes in here what the workers report, draws, or takes note of a
+    /// stop before the arm stands.
+    #[test]
+    fn a_stop_at_any_instant_brings_the_arm_to_rest_in_time_while_the_window_is_in_a_frame() {
+        let mut live = Live::new(true);
+        let start = live.joints();
+        let stop = Arc::clone(live.bench.workers.stop_line());
+        // Steele and Vigna's SplitMix64; the same instants every time.
+        let mut state = 35_u64;
+        let mut random = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut took = Vec::new();
+        for trial in 0..100 {
+            let at = live.joints();
+            let mut goal = start;
+            goal[0] += if at[0] > start[0] { -1.2 } else { 1.2 };
+            if trial % 4 == 3 {
+                let jog = Jog::Joint { index: 0, forward: goal[0] > at[0] };
+                live.bench.workers.hold_jog(jog, SPEED, None);
+            } else {
+                live.bench.move_to(trial, MotionGoal::Joints(goal), SPEED);
+            }
+            live.wait_until_moving(&at);
+            let until_s = live.time_s() + random();
+            while live.time_s() < until_s {}
+            let pressed_s = live.time_s();
+            let number = stop.press_outside();
+            took.push(live.last_moved_s() - pressed_s);
+            // What the window still asks for was asked for before the stop.
+            let stood = live.joints();
+            live.bench.move_to(1000 + trial, MotionGoal::Joints(start), 1.0);
+            live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 1.0, None);
+            assert!(live.is_at_rest() && live.joints() == stood, "trial {trial}");
+            live.bench.workers.release_jog();
+            live.bench.moved(1000 + trial);
+            stop.note(number);
+            while stop.is_barred() {}
+        }
+        took.sort_by(f64::total_cmp);
+        println!("at rest after {:.3} s in the median, {:.3} s at most, of the cell's time", took[50], took[99]);
+        assert!(took[99] <= AT_REST_S, "{took:?}");
+    }
 
     #[test]
     fn every_pose_of_the_reference_sequence_is_reached_at_full_and_at_a_quarter_of_the_speed() {

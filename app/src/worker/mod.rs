@@ -32,12 +32,13 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 use handeye_core::geometry::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_core::plan::Surroundings;
 use handeye_sim_link::client::CancelToken;
 
-pub use crate::connect::worker::{ControlTask, StopLine};
+pub use crate::connect::stop_line::StopLine;
+pub use crate::connect::worker::ControlTask;
 pub use crate::live::worker::CameraTask;
 pub use crate::motion::desk::{MotionQueue, MotionTask};
 pub use crate::motion::jog_line::HELD_S;
@@ -61,6 +62,7 @@ pub use vision::VisionTask;
 
 use crate::capture::Measured;
 use crate::command::Event;
+use crate::connect::stop_line::Ends;
 use crate::connect::worker::Control;
 use crate::guided::state::GuideRequest;
 use crate::live::worker::Camera;
@@ -79,7 +81,8 @@ pub struct Workers {
     camera: Option<Sender<Request<CameraTask>>>,
     motion: Option<Sender<Request<MotionLook>>>,
     vision: Option<Sender<VisionTask>>,
-    events: Option<Receiver<Event>>,
+    /// Those of the control worker come last: that the arm was stopped is told after what the stop ended.
+    events: Option<[Receiver<Event>; 2]>,
     stop: Arc<StopLine>,
     desk: Arc<MotionQueue>,
     clock: Clock,
@@ -104,14 +107,21 @@ impl Workers {
         view: &ViewSettings,
         connector: &Arc<dyn Connector>,
         captures: Sender<Measured>,
+        stop: &Arc<StopLine>,
         clock: &Clock,
         waker: &Waker,
     ) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
-        let mut workers = Self::idle(events, connector, clock, waker);
-        let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
+        // Who stops the arm never waits for the window to look.
+        let (control_sender, control_events) = unbounded();
+        let mut workers = Self::idle([events, control_events], stop, connector, clock, waker);
+        let outlet_to = |events: &Sender<Event>| {
+            let events = events.clone();
+            Outlet { events, waker: Arc::clone(waker), clock: Arc::clone(clock) }
+        };
+        let outlet = || outlet_to(&event_sender);
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
-        workers.control = Some(workers.spawn("control", duty, source, connector, outlet())?);
+        workers.control = Some(workers.spawn("control", duty, source, connector, outlet_to(&control_sender))?);
         let (tap, bell) = Tap::new();
         let tap = Arc::new(tap);
         let duty = Camera::new(view, Arc::clone(&workers.frames), Arc::clone(&tap));
@@ -127,19 +137,26 @@ impl Workers {
         let vision = Vision::new(tap, bell, tasks, sights, captures, outlet(), workers.shutdown.clone());
         workers.run("vision", move || vision.run())?;
         workers.vision = Some(sender);
+        workers.lead_stop();
         Ok(workers)
     }
 
     /// No threads yet.
-    fn idle(events: Receiver<Event>, connector: &Arc<dyn Connector>, clock: &Clock, waker: &Waker) -> Self {
+    fn idle(
+        events: [Receiver<Event>; 2],
+        stop: &Arc<StopLine>,
+        connector: &Arc<dyn Connector>,
+        clock: &Clock,
+        waker: &Waker,
+    ) -> Self {
         Self {
             control: None,
             camera: None,
             motion: None,
             vision: None,
             events: Some(events),
-            stop: Arc::default(),
-            desk: Arc::new(MotionQueue::new(Arc::clone(waker))),
+            stop: Arc::clone(stop),
+            desk: Arc::new(MotionQueue::new(Arc::clone(stop.grip()), Arc::clone(waker))),
             clock: Arc::clone(clock),
             robot: Arc::default(),
             frames: Arc::default(),
@@ -150,6 +167,12 @@ impl Workers {
             shutdown: CancelToken::default(),
             threads: Vec::new(),
         }
+    }
+
+    /// From now on a stop reaches these threads.
+    fn lead_stop(&self) {
+        let Some(control) = self.control.clone() else { return };
+        self.stop.lead_to(Ends { desk: Arc::clone(&self.desk), control, clock: Arc::clone(&self.clock) });
     }
 
     fn spawn<D: Duty + 'static>(
@@ -177,8 +200,8 @@ impl Workers {
 
     /// Hands over everything that was reported since the last time. Never waits for a worker.
     pub fn drain(&self, mut absorb: impl FnMut(Event)) {
-        for event in self.events.iter().flat_map(Receiver::try_iter).take(MAX_EVENTS) {
-            absorb(event);
+        for events in self.events.iter().flatten() {
+            events.try_iter().take(MAX_EVENTS).for_each(&mut absorb);
         }
         self.desk.take_said().into_iter().for_each(&mut absorb);
         if let Some((robot, _)) = self.robot.take() {
@@ -203,10 +226,11 @@ impl Workers {
     /// that could begin afterwards.
     pub fn press_stop(&self) {
         self.stop.press();
-        self.desk.cancel(self.now_s());
-        // Only to wake a resting worker: one that is too busy to take it looks at the stop line by itself.
-        let woken = self.ask_control(Request::Do(ControlTask::CheckStop));
-        tracing::debug!(?woken, "stop pressed");
+    }
+
+    /// What stops the arm, for other threads.
+    pub fn stop_line(&self) -> &Arc<StopLine> {
+        &self.stop
     }
 
     /// Has the arm keep out of these from its next motion on, also over the next connection.
@@ -277,7 +301,7 @@ impl Workers {
     /// a button is let go that had been held for longer.
     pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
         let request = JogRequest { jog, tip_from_camera, speed };
-        if self.desk.hold(request, self.stop.is_pressed(), self.now_s()) {
+        if self.desk.hold(request, &self.stop, self.now_s()) {
             self.wake_motion();
         }
     }
@@ -291,7 +315,7 @@ impl Workers {
         if self.motion.is_none() {
             return Err(Busy);
         }
-        self.desk.ask(task, self.stop.is_pressed());
+        self.desk.ask(task, &self.stop);
         self.wake_motion();
         Ok(())
     }
@@ -367,7 +391,7 @@ impl Workers {
             if !self.is_moving() && !self.stop.is_pressed() {
                 return true;
             }
-            let Some(events) = self.events.as_ref().filter(|_| Instant::now() < end) else { return false };
+            let Some([events, _]) = self.events.as_ref().filter(|_| Instant::now() < end) else { return false };
             let _lost = events.recv_timeout(POLL).is_ok();
         }
     }
@@ -376,6 +400,7 @@ impl Workers {
     /// within the deadline is left alone, so that the program can end; returns how many there are.
     pub fn shut_down(&mut self, deadline: Duration) -> usize {
         self.shutdown.cancel();
+        self.stop.lead_away_from(&self.desk);
         self.control = None;
         self.camera = None;
         self.motion = None;

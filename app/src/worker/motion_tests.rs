@@ -36,7 +36,8 @@ impl Bench {
         let shown = Arc::clone(&now_s);
         let clock: Clock = Arc::new(move || *shown.lock().unwrap_or_else(PoisonError::into_inner));
         let view = ViewSettings::default();
-        let workers = Workers::start(source, &view, connector, bounded(1).0, &clock, &waker).expect("threads");
+        let workers =
+            Workers::start(source, &view, connector, bounded(1).0, &Arc::default(), &clock, &waker).expect("threads");
         let mut bench = Self { workers, woken, now_s, events: Vec::new(), next: 0 };
         for link in [Link::Control, Link::Motion] {
             bench.next = 0;
@@ -144,6 +145,63 @@ fn begun(cell: &FakeCell, count: usize) {
 fn the_facts_of_the_cell_are_told_after_connecting() {
     let (_cell, mut bench) = fake(FakeMotions::Arrive);
     assert!(bench.facts().arm.is_some());
+}
+
+/// The window is in a long frame: nobody takes in what the workers report, and a driver has a lot to say.
+#[test]
+fn a_stop_does_not_wait_for_a_window_that_takes_nothing_in() {
+    let (cell, bench) = fake(FakeMotions::Arrive);
+    cell.script().lines = 2 * MAX_EVENTS;
+    let deadline = Instant::now() + PATIENCE;
+    let asked = cell.script().asked_for_lines;
+    while cell.script().asked_for_lines < asked + 2 {
+        assert!(Instant::now() < deadline, "the worker waits for the window");
+        std::thread::yield_now();
+    }
+    bench.workers.stop_line().press_outside();
+    while cell.script().stops == 0 {
+        assert!(Instant::now() < deadline, "the arm is not stopped");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn nothing_begins_between_a_stop_of_another_thread_and_the_note_that_the_window_takes() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    let stop = Arc::clone(bench.workers.stop_line());
+    let number = stop.press_outside();
+    bench.stopped();
+    // A sequence that goes on, a button that was pressed before.
+    bench.move_to(1, HOME, 1.0);
+    assert!(matches!(bench.moved(1), MotionOutcome::Refused(_)));
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    assert!(bench.jog_ended().is_some_and(|why| why.contains("being stopped")));
+    assert!(cell.script().moved.is_empty() && cell.script().jogged.is_empty());
+    bench.workers.release_jog();
+    stop.note(number);
+    bench.move_to(2, HOME, 1.0);
+    assert_eq!(bench.moved(2), MotionOutcome::Arrived);
+}
+
+#[test]
+fn what_is_let_go_at_a_page_stands_while_the_window_still_takes_it_for_held() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    let grip = Arc::clone(bench.workers.stop_line().grip());
+    bench.workers.hold_jog(LEFT, 0.5, None);
+    begun(&cell, 1);
+    grip.let_go();
+    assert_eq!(bench.jog_ended(), None);
+    for step in 1..20 {
+        // Frames that take longer than a press holds without a word.
+        bench.set_clock(f64::from(step));
+        bench.workers.hold_jog(LEFT, 0.5, None);
+    }
+    bench.workers.release_jog();
+    assert_eq!(bench.jog_ended(), None);
+    assert_eq!(cell.script().jogged.len(), 1, "it begins again by itself");
+    grip.know(grip.times(Instant::now()));
+    bench.workers.hold_jog(RIGHT, 0.5, None);
+    begun(&cell, 2);
 }
 
 #[test]

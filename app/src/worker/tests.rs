@@ -25,8 +25,9 @@ impl Bench {
         let waker: Waker = wakes(wake);
         let clock: Clock = Arc::new(|| 7.0);
         let connector: Arc<dyn Connector> = Arc::new(cell.clone());
-        let workers = Workers::start(source, &ViewSettings::default(), &connector, bounded(1).0, &clock, &waker)
-            .expect("threads can be started");
+        let workers =
+            Workers::start(source, &ViewSettings::default(), &connector, bounded(1).0, &Arc::default(), &clock, &waker)
+                .expect("threads can be started");
         Self { workers, woken, events: Vec::new(), next: 0 }
     }
 
@@ -121,9 +122,16 @@ fn the_newest_image_wins_and_the_others_are_counted() {
     let waker: Waker = wakes(wake);
     let clock: Clock = Arc::new(|| 0.0);
     let connector: Arc<dyn Connector> = Arc::new(cell.clone());
-    let workers =
-        Workers::start(&CellSource::default(), &ViewSettings::default(), &connector, bounded(1).0, &clock, &waker)
-            .expect("threads");
+    let workers = Workers::start(
+        &CellSource::default(),
+        &ViewSettings::default(),
+        &connector,
+        bounded(1).0,
+        &Arc::default(),
+        &clock,
+        &waker,
+    )
+    .expect("threads");
     // Nobody drains until the fifth image has been put; each put wakes.
     let mut robot_or_image = 0;
     while cell.script().frames < 5 || robot_or_image < 12 {

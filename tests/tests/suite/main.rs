@@ -37,6 +37,7 @@ mod slow {
     mod rerun_viewers;
     mod robots;
     mod served;
+    mod stops;
     mod tracking;
     mod verifying;
     mod web_page;

@@ -3,6 +3,7 @@
 use egui::{ComboBox, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use crate::gui::style::{form, parts};
+use crate::gui::typed::MOST_TYPED;
 use crate::model::{CellSource, Drivers, Model};
 use crate::tr;
 
@@ -75,7 +76,8 @@ fn known(model: &Model, freehand: bool) -> Vec<Drivers> {
 
 fn field_ui(ui: &mut Ui, name: &str, label: &str, hint: &str, value: &mut String) {
     let field = form::row_ui(ui, name, |ui| {
-        ui.add(TextEdit::singleline(value).desired_width(ui.available_width().min(360.0)).hint_text(hint))
+        let width = ui.available_width().min(360.0);
+        ui.add(TextEdit::singleline(value).char_limit(MOST_TYPED).desired_width(width).hint_text(hint))
     });
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, label));
 }

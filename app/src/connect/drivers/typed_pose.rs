@@ -49,8 +49,8 @@ pub fn typed_pose_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         response.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, label));
     });
     let hint = columns(draft.rotation);
-    let field =
-        ui.add(TextEdit::multiline(&mut draft.numbers).desired_rows(2).desired_width(f32::INFINITY).hint_text(hint));
+    let field = TextEdit::multiline(&mut draft.numbers).char_limit(400).desired_rows(2);
+    let field = ui.add(field.desired_width(f32::INFINITY).hint_text(hint));
     let label = tr!(language, "Numbers of the pose");
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, label));
     let metres_per_unit = if draft.in_metres { 1.0 } else { 1e-3 };

@@ -29,14 +29,14 @@ pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut 
     Panel::left("rail").frame(side).resizable(false).exact_size(rail::WIDTH).show(ui, |ui| {
         rail::rail_ui(ui, model, outbox);
         ui.add_space(GAP);
-        toasts::toasts_ui(ui, model, layout, outbox);
-    });
-    let centre = Frame::new().fill(palette.backdrop).inner_margin(Margin::same(GAP as i8));
-    CentralPanel::default().frame(centre).show(ui, |ui| {
         if let Some(hindrance) = status::hindrance(model).filter(|_| model.frame.is_some()) {
             crate::messages::banner::banner_ui(ui, &hindrance, model.view.language, outbox);
             ui.add_space(GAP);
         }
+        toasts::toasts_ui(ui, model, layout, outbox);
+    });
+    let centre = Frame::new().fill(palette.backdrop).inner_margin(Margin::same(GAP as i8));
+    CentralPanel::default().frame(centre).show(ui, |ui| {
         tiles::tiles_ui(ui, model, textures, layout, outbox);
     });
 }

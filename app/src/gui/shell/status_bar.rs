@@ -5,7 +5,7 @@ use egui::{Button, Label, RichText, Sense, Ui};
 use handeye_core::geometry::arm::{JointKind, MAX_JOINTS};
 
 use crate::command::{Command, Outbox};
-use crate::gui::status::STALE_AFTER_S;
+use crate::gui::status::{STALE_AFTER_S, robot_age};
 use crate::gui::style::numbers;
 use crate::gui::style::theme::{self, CAPTION, Palette};
 use crate::guided;
@@ -29,7 +29,8 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     // What is on the screen after a loss is history, and looks like it.
     let language = model.view.language;
-    let live = model.control.is_connected();
+    let robot_age = robot_age(model);
+    let live = robot_age.is_none();
     let robot = model.robot.as_ref();
     ui.spacing_mut().item_spacing.x = 18.0;
     ui.horizontal(|ui| {
@@ -64,6 +65,9 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let stale = model.frame_age_s().is_some_and(|age_s| age_s > STALE_AFTER_S);
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
         field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
+        if let Some(age) = robot_age.filter(|_| robot.is_some()) {
+            field_ui(ui, tr!(language, "Robot"), &age.say(language), "", palette.warning);
+        }
     });
     ui.add_space(2.0);
     message_ui(ui, model);

@@ -5,8 +5,9 @@ use egui::{Align, Button, Label, Layout, RichText, Sense, Stroke, Ui, Vec2, Widg
 use super::menu;
 use crate::command::{Command, Outbox};
 use crate::gui::status::{self, STALE_AFTER_S, Status};
+use crate::gui::stop_button::{Face, stop_button_ui};
 use crate::gui::style::icons::{self, Icon};
-use crate::gui::style::theme::{self, Palette, Tone};
+use crate::gui::style::theme::{self, Palette};
 use crate::model::Model;
 use crate::rerun_log::button::rerun_button_ui;
 use crate::session::facts::SessionFacts;
@@ -137,15 +138,14 @@ fn history_ui(
 }
 
 fn stop_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
-    let palette = Palette::of(ui);
-    let language = model.view.language;
-    let text = if model.stop_pending { tr!(language, "STOPPING…") } else { tr!(language, "STOP") };
-    let button = Button::new(theme::title(text, 13.5).color(palette.on_bad))
-        .fill(palette.tone(Tone::Bad))
+    let face = Face::of(ui, model, tr!(model.view.language, "STOP"));
+    // All that it says has room in it, so that it keeps its place.
+    let letters = if face.can_act { 13.5 } else { 11.0 };
+    let button = Button::new(theme::title(face.words, letters).color(face.ink))
+        .fill(face.fill)
         .stroke(Stroke::NONE)
         .min_size(Vec2::new(104.0, HEIGHT));
-    let hint = tr!(language, "Have the arm stay where it is (Esc). No substitute for an emergency stop");
-    if ui.add(button).on_hover_text(hint).clicked() {
+    if stop_button_ui(ui, button).on_hover_text(face.hint).clicked() {
         outbox.send(Command::Stop);
     }
 }

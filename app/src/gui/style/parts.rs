@@ -76,6 +76,11 @@ pub fn notice_ui<R>(ui: &mut Ui, tone: Tone, text: &str, below_ui: impl FnOnce(&
 /// A caption and its value, read together by a screen reader.
 pub fn stated_ui(ui: &mut Ui, caption: &str, value: &str) -> Response {
     let colour = Palette::of(ui).text;
+    stated_in_ui(ui, caption, value, colour)
+}
+
+/// The same in a colour.
+pub fn stated_in_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
     ui.scope(|ui| {
         // Numbers stand closer than controls do.
         ui.spacing_mut().interact_size.y = 18.0;

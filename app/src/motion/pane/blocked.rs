@@ -60,6 +60,13 @@ impl Blocked {
             }
         });
     }
+
+    /// The reason for motions of the tip alone.
+    pub fn tip_ui(&self, ui: &mut Ui) {
+        if let Some(reason) = self.tip.filter(|_| self.arm.is_none()) {
+            parts::hint_ui(ui, reason);
+        }
+    }
 }
 
 /// Why the arm's chain of joints is not known, so that nothing can be planned with it; `None` where it is.

@@ -55,6 +55,9 @@ pub fn joints_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold,
         goal = None;
     }
     ui.add_enabled_ui(blocked.arm.is_none(), |ui| {
+        if !model.is_robot_live() {
+            ui.visuals_mut().override_text_color = Some(Palette::of(ui).weak);
+        }
         for index in 0..live.len() {
             row_ui(ui, model, index, &live, &mut goal, hold, outbox);
         }

@@ -9,7 +9,7 @@ mod settings;
 mod status;
 mod typed;
 
-use egui::Ui;
+use egui::{ScrollArea, Ui};
 
 use crate::command::Outbox;
 use crate::connect::drivers::typed_pose::typed_pose_ui;
@@ -20,6 +20,11 @@ use blocked::Blocked;
 pub use blocked::unknown_arm;
 use hold::Hold;
 
+/// Room \[points\] for a notice of two lines.
+const ROOM_TO_SAY: f32 = 54.0;
+/// The same with the question whether a robot may be moved, and its button.
+const ROOM_TO_ALLOW: f32 = 100.0;
+
 /// The pane.
 pub fn jog_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if model.moves() == Moves::Never {
@@ -28,15 +33,30 @@ pub fn jog_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let blocked = Blocked::of(model);
     parts::body_ui(ui, "jog", |ui| {
         let mut hold = Hold::begin(ui);
-        blocked.arm_ui(ui, model, outbox);
-        allowance::allowance_ui(ui, model, outbox);
         status::status_ui(ui, model, outbox);
+        notices_ui(ui, model, &blocked, outbox);
         settings::settings_ui(ui, model, outbox);
         pad::pad_ui(ui, model, &blocked, &mut hold);
         joints::joints_ui(ui, model, &blocked, &mut hold, outbox);
         status::tip_ui(ui, model);
         typed::typed_ui(ui, model, &blocked, outbox);
         hold.finish(ui, outbox);
+    });
+}
+
+/// What is in the way, was refused, or has to be allowed. It has its room also while there is nothing to say: what moves the
+/// arm does not change its place under the pointer. Longer words are scrolled.
+fn notices_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbox) {
+    let height = if matches!(model.moves(), Moves::OnceArmed { .. }) { ROOM_TO_ALLOW } else { ROOM_TO_SAY };
+    let size = egui::vec2(ui.available_width(), height);
+    ui.allocate_ui(size, |ui| {
+        ui.set_min_size(size);
+        ScrollArea::vertical().id_salt("notices").max_height(height).auto_shrink(false).show(ui, |ui| {
+            status::refusal_ui(ui, model, outbox);
+            blocked.arm_ui(ui, model, outbox);
+            blocked.tip_ui(ui);
+            allowance::allowance_ui(ui, model, outbox);
+        });
     });
 }
 

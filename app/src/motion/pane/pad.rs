@@ -22,9 +22,6 @@ const KEYS: [(Axis, Key, Key); 3] = [
 pub fn pad_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold) {
     let language = model.view.language;
     let frame = model.view.jog.frame;
-    if let Some(reason) = blocked.tip.filter(|_| blocked.arm.is_none()) {
-        parts::hint_ui(ui, reason);
-    }
     let wide = ((ui.available_width() - 84.0) / 4.0).clamp(36.0, 76.0);
     ui.add_enabled_ui(blocked.tip.is_none(), |ui| {
         egui::Grid::new("jog pad").num_columns(6).spacing([6.0, 5.0]).min_col_width(0.0).show(ui, |ui| {

@@ -3,18 +3,26 @@
 use egui::{Align, Button, Layout, RichText, Ui};
 
 use crate::command::{Command, Outbox};
+use crate::gui::status::robot_age;
+use crate::gui::stop_button::{Face, stop_button_ui};
 use crate::gui::style::numbers;
 use crate::gui::style::parts::{self, Sign};
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::{Model, Motion, Pane, RotationFormat, Severity};
 use crate::{text, tr};
 
-/// The motion with a button that ends it, and the last refusal.
+/// The motion with a button that ends it.
 pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let palette = Palette::of(ui);
     let (colour, what) = match &model.motion {
+        _ if model.stop_pending && !model.control.is_connected() => {
+            (palette.weak, tr!(language, "The arm is stopped once the connection is back").to_owned())
+        }
         _ if model.stop_pending => (palette.warning, tr!(language, "Stopping").to_owned()),
+        _ if let Some(age) = robot_age(model) => {
+            (palette.weak, text!("Not known whether the arm moves: {age}", age = age).say(language))
+        }
         Motion::Idle => (palette.good, tr!(language, "The arm is at rest").to_owned()),
         Motion::Moving { what, since_s, .. } => {
             let seconds = format!("{:.0}", (model.now_s - since_s).max(0.0));
@@ -25,8 +33,9 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.horizontal(|ui| {
         parts::dot_ui(ui, colour);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let stop = Button::new(RichText::new(tr!(language, "Stop")).color(palette.on_bad)).fill(palette.bad);
-            if ui.add(stop).on_hover_text(tr!(language, "Have the arm stay where it is")).clicked() {
+            let face = Face::of(ui, model, tr!(language, "Stop"));
+            let stop = Button::new(RichText::new(face.words).color(face.ink)).fill(face.fill);
+            if stop_button_ui(ui, stop).on_hover_text(face.hint).clicked() {
                 outbox.send(Command::Stop);
             }
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -34,10 +43,10 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             });
         });
     });
-    refusal_ui(ui, model, outbox);
 }
 
-fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+/// Why the arm did not do what it was asked for last.
+pub fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some(message) = model.messages.standing_in(Pane::Jog) else { return };
     let tone = if message.severity == Severity::Error { Tone::Bad } else { Tone::Warning };
@@ -57,20 +66,25 @@ pub fn tip_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let Some(robot) = &model.robot else { return };
     let pose = &robot.base_from_tip;
-    parts::section_with_ui(ui, tr!(language, "Tip in base"), |ui| {
+    let (mut title, mut colour) = (tr!(language, "Tip in base").to_owned(), Palette::of(ui).text);
+    if let Some(age) = robot_age(model) {
+        title = format!("{title} · {}", age.say(language));
+        colour = Palette::of(ui).weak;
+    }
+    parts::section_with_ui(ui, &title, |ui| {
         parts::copy_ui(ui, language, tr!(language, "the tip pose"), || {
             let [x, y, z]: [f64; 3] = pose.translation().into();
             let [qx, qy, qz, qw] = pose.xyzw();
             format!("base_from_tip: translation_m = [{x}, {y}, {z}], rotation_xyzw = [{qx}, {qy}, {qz}, {qw}]")
         });
     });
-    parts::stated_ui(ui, "x y z [mm]", &numbers::translation_mm(pose));
+    parts::stated_in_ui(ui, "x y z [mm]", &numbers::translation_mm(pose), colour);
     match model.view.rotation {
         RotationFormat::RollPitchYaw => {
-            parts::stated_ui(ui, tr!(language, "roll pitch yaw [°]"), &numbers::rpy_deg(pose))
+            parts::stated_in_ui(ui, tr!(language, "roll pitch yaw [°]"), &numbers::rpy_deg(pose), colour)
         }
         RotationFormat::Quaternion => {
-            parts::stated_ui(ui, tr!(language, "quaternion x y z w"), &numbers::quaternion(pose))
+            parts::stated_in_ui(ui, tr!(language, "quaternion x y z w"), &numbers::quaternion(pose), colour)
         }
     };
 }

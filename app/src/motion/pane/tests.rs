@@ -300,6 +300,57 @@ fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
     assert_eq!(pane.click("Dismiss the message"), [Command::DismissMessage(0)]);
 }
 
+/// What moves the arm, as it is called.
+const MOVERS: [&str; 8] =
+    ["Move +X", "Turn −Z", "Jog joint 1 +", "Jog joint 6 −", "Move there", "Speed in percent", "Jog with keys", "Stop"];
+
+#[test]
+fn what_moves_the_arm_keeps_its_place_whatever_is_said() {
+    let places = |model: Model| {
+        let pane = driven(model);
+        MOVERS.map(|name| pane.harness.get_by_label(name).rect().min)
+    };
+    let before = places(sample::connected());
+    let long = "The arm does not move to the next pose: ".repeat(20);
+    let says = |words: &str, severity| {
+        let mut model = sample::connected();
+        model.messages.say_at(Home::Pane(Pane::Jog), severity, Text::verbatim(words), 99.0);
+        model
+    };
+    let mut unknown_arm = sample::connected();
+    unknown_arm.cell.as_mut().expect("a cell").arm = None;
+    let mut old = sample::connected();
+    old.robot_read_s = Some(old.now_s - 12.0);
+    let mut sequence = sample::connected();
+    sequence.sequence_runs = true;
+    let mut lost = sample::connected();
+    lost.mover = LinkState::Failed { why: Text::verbatim("the cable is out") };
+    for (what, model) in [
+        ("a refusal", says("Joint 2 would leave its range", Severity::Warning)),
+        ("a long refusal", says(&long, Severity::Error)),
+        ("an arm without kinematics", unknown_arm),
+        ("an old reading", old),
+        ("a sequence", sequence),
+        ("a connection that is lost", lost),
+    ] {
+        assert_eq!(places(model), before, "{what}");
+    }
+}
+
+#[test]
+fn what_is_not_known_of_the_arm_is_said_with_its_age_and_stop_says_that_it_cannot_act() {
+    let mut model = sample::connected();
+    assert!(driven(model.clone()).sees("The arm is at rest"));
+    model.robot_read_s = Some(model.now_s - 12.0);
+    let pane = driven(model.clone());
+    assert!(pane.sees("Not known whether the arm moves: last read 12 s ago"));
+    assert!(pane.sees("Tip in base · last read 12 s ago"));
+    assert!(!pane.sees("The arm is at rest") && pane.sees("Stop"));
+    model.control = LinkState::Resting { why: Text::verbatim("the cable is out") };
+    let pane = driven(model);
+    assert!(pane.sees("STOP cannot act") && !pane.sees("The arm is at rest"));
+}
+
 #[test]
 fn nothing_is_wider_than_the_tile() {
     assert!(driven(sample::connected()).nothing_is_cut_off());

@@ -8,8 +8,9 @@ use super::canvas::{Canvas, Cylinder};
 use crate::gui::style::theme::Palette;
 use crate::scene::PosedArm;
 
-/// Draws them.
-pub fn arm(canvas: &mut Canvas, arm: &PosedArm, palette: &Palette) {
+/// Draws them; in grey where the arm is not known to be there now.
+pub fn arm(canvas: &mut Canvas, arm: &PosedArm, is_live: bool, palette: &Palette) {
+    let tone = |colour, palette| if is_live { tone(colour, palette) } else { grey(palette) };
     // The ends of tubes are inside of the housings of an arm that has some.
     let has_housings = arm.bodies.iter().any(|(_, solid)| matches!(solid.shape, Shape::Cylinder { .. }));
     for (link, solid) in &arm.bodies {
@@ -31,6 +32,11 @@ pub fn arm(canvas: &mut Canvas, arm: &PosedArm, palette: &Palette) {
         let body = Cylinder { ends, radius_m, closed };
         canvas.cylinder(&body, tone(solid.colour, palette));
     }
+}
+
+/// Of what is not known.
+fn grey(palette: &Palette) -> Color32 {
+    palette.well.lerp_to_gamma(palette.weak, 0.35)
 }
 
 /// A body in the theme of the window: bright, dark or of a cover.

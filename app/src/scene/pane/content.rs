@@ -49,12 +49,14 @@ pub fn draw(canvas: &mut Canvas, ui: &Ui, model: &Model, table: &CaptureTable, p
     let known = Known::of(model);
     if let Some(robot) = model.robot.as_ref().filter(|robot| robot.base_from_tip.is_finite()) {
         if let Some(posed) = posed_arm(model.cell.as_ref(), &robot.base_from_tip, &robot.joints_rad) {
-            arm::arm(canvas, &posed, palette);
+            arm::arm(canvas, &posed, model.is_robot_live(), palette);
         }
-        canvas.axes(robot.base_from_tip.isometry(), AXES_M, 2.2, marks.axes);
+        let colours = if model.is_robot_live() { marks.axes } else { marks.axes.map(|_| palette.weak) };
+        canvas.axes(robot.base_from_tip.isometry(), AXES_M, 2.2, colours);
     }
     entries.extend(boxes::boxes(canvas, &model.keep_out, language, palette));
-    live_camera(canvas, &known, language, palette, &mut entries);
+    let seen = if model.is_robot_live() { palette.good } else { palette.weak };
+    live_camera(canvas, &known, language, seen, &mut entries);
     let spots = captures::captures(canvas, model, &known, palette, marks, pointed);
     entries.extend(planned::planned(canvas, model, &known, language, palette));
     entries.extend(capture_entries(table, language, palette, marks));
@@ -122,12 +124,11 @@ fn grid_entry(palette: &Palette, language: Language) -> Entry {
     }
 }
 
-fn live_camera(canvas: &mut Canvas, known: &Known, language: Language, palette: &Palette, entries: &mut Vec<Entry>) {
+fn live_camera(canvas: &mut Canvas, known: &Known, language: Language, colour: Color32, entries: &mut Vec<Entry>) {
     // A camera that stands still is known without the robot.
     let Some(CameraItem { role, place, shape: Some(intrinsics) }) = known.camera() else { return };
     let Some(base_from_camera) = place.in_base(known.base_from_tip.as_ref()).filter(Pose::is_finite) else { return };
     let frustum = Frustum { base_from_camera, intrinsics: &intrinsics, length_m: CAMERA_LENGTH_M };
-    let colour = palette.good;
     frustum.draw(canvas, 1.8, colour, colour.gamma_multiply(0.10));
     let (name, what) = if role == Role::Predictor {
         (

@@ -22,7 +22,8 @@ use handeye_core::project::session::CaptureId;
 use crate::capture::rows as tables;
 use crate::capture::rows::CaptureTable;
 use crate::command::{Command, Outbox};
-use crate::gui::style::marks;
+use crate::gui::status::robot_age;
+use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{self, Palette};
 use crate::keep_out;
@@ -116,6 +117,12 @@ fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox:
     }
     canvas.paint(ui.painter());
     legend::legend_ui(ui, room, &drawn.entries);
+    if let Some(age) = robot_age(model).filter(|_| model.robot.is_some()) {
+        let words = text!("Robot: {age}", age = age).say(language);
+        let plate = marks::plate(ui.painter(), room.min + Vec2::splat(INSET), &words, Marks::over_images().review);
+        let said = ui.interact(plate, ui.id().with("age"), Sense::hover());
+        said.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, &words));
+    }
     let now = spots_ui(ui, room, model, table, &drawn.spots, outbox);
     if now != pointed {
         parts::remember(ui, key, now);

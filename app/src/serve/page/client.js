@@ -7,15 +7,20 @@ const [canvas, typing, bar, barText, driveButton, stopButton, keyboardButton, no
   ['frame', 'typing', 'bar', 'bar-text', 'drive', 'stop', 'keyboard', 'note'].map(element);
 
 /// While something is held down, it is said so often [ms]; when it is no longer said, the window lets go of it.
-const RENEWAL_MS = 80;
+const RENEWAL_MS = 50;
 /// Between two attempts to connect, at first and at most [ms].
 const RETRY_MS = [300, 4000];
+/// Heard at least so often, or what is shown is not known to be so any more [ms]. The server says every second that it is there.
+const STALE_MS = 4000;
 /// Heard at least so often, or the connection is made anew [ms].
 const SILENCE_MS = 15000;
+/// Longest text that is pasted at once [letters]; the server takes no more.
+const MOST_PASTED = 4096;
 
 let words = {
   watching: 'You are watching', nobody: 'Nobody drives', drive: 'Drive', stop: 'STOP',
-  lost: 'The connection is lost; trying again…', uploading: 'Uploading…',
+  lost: 'The connection to the workbench is lost. What is shown is of {time}, and STOP does not act from here: use the '
+    + 'emergency stop of the robot', uploading: 'Uploading…',
   not_uploaded: 'The files could not be uploaded',
 };
 let people = { you: true, driven: true, pages: 1 };
@@ -71,6 +76,8 @@ function fit() {
 class Connection {
   constructor() {
     this.retry = RETRY_MS[0];
+    /// When the server was last heard.
+    this.heard = new Date();
     /// How many connections there were.
     this.count = 0;
     this.name = sessionStorage.getItem('page') ?? [...crypto.getRandomValues(new Uint8Array(12))]
@@ -89,20 +96,21 @@ class Connection {
       this.retry = RETRY_MS[0];
       this.count += 1;
       show.painter.postMessage({ connection: this.count });
-      sayNote('');
       sayScreen();
       this.send({ t: 'visible', visible: !document.hidden });
       if (reader.on) reader.say();
     };
     socket.onmessage = ({ data }) => {
       if (socket !== this.socket) return;
+      this.heard = new Date();
       this.watch();
+      sayStale(null);
       if (data instanceof ArrayBuffer) show.painter.postMessage({ frame: data }, [data]);
       else heard(JSON.parse(data));
     };
     socket.onclose = () => {
       if (socket !== this.socket) return;
-      sayNote(words.lost);
+      sayStale(this.heard);
       letGo();
       this.timer = setTimeout(() => this.open(), this.retry);
       this.retry = Math.min(this.retry * 2, RETRY_MS[1]);
@@ -113,6 +121,8 @@ class Connection {
   /// A network that is gone says nothing, not even that.
   watch() {
     clearTimeout(this.watchdog);
+    clearTimeout(this.stale);
+    this.stale = setTimeout(() => sayStale(this.heard), STALE_MS);
     this.watchdog = setTimeout(() => this.again(), SILENCE_MS);
   }
 
@@ -120,7 +130,7 @@ class Connection {
     const { socket } = this;
     this.socket = null;
     socket?.close();
-    sayNote(words.lost);
+    sayStale(this.heard);
     this.open();
   }
 
@@ -156,6 +166,16 @@ function sayBar() {
   driveButton.textContent = words.drive;
   stopButton.textContent = words.stop;
   fit();
+}
+
+/// What is shown is not known to be so since a time, or is so now: it is grey, and STOP, which acts no more, says so.
+let isStale = false;
+function sayStale(since) {
+  if (isStale === Boolean(since)) return;
+  isStale = Boolean(since);
+  document.body.classList.toggle('stale', isStale);
+  driveButton.disabled = stopButton.disabled = isStale;
+  sayNote(since ? words.lost.replace('{time}', since.toLocaleTimeString()) : '');
 }
 
 function sayNote(text, quiet = false) {
@@ -228,6 +248,9 @@ function letGo() {
   renew();
 }
 
+/// The first letters of a text; one that is two numbers long is not cut in two.
+const cut = (text) => (text.length > MOST_PASTED ? [...text.slice(0, 2 * MOST_PASTED)].slice(0, MOST_PASTED).join('') : text);
+
 const modifiersOf = (event) =>
   (event.altKey ? 1 : 0) | (event.ctrlKey ? 2 : 0) | (event.shiftKey ? 4 : 0) | (event.metaKey ? 8 : 0);
 
@@ -297,9 +320,9 @@ document.addEventListener('keyup', (event) => {
   if (key !== undefined) done({ e: 'key', key, down: false, modifiers: modifiersOf(event) });
 });
 
-typing.addEventListener('compositionupdate', (event) => done({ e: 'compose', text: event.data }));
+typing.addEventListener('compositionupdate', (event) => done({ e: 'compose', text: cut(event.data) }));
 typing.addEventListener('compositionend', (event) => {
-  done({ e: 'composed', text: event.data });
+  done({ e: 'composed', text: cut(event.data) });
   typing.value = '';
 });
 typing.addEventListener('input', (event) => {
@@ -308,7 +331,7 @@ typing.addEventListener('input', (event) => {
     // A keyboard of the screen deletes without a key.
     for (const isDown of [true, false]) done({ e: 'key', key: 'Backspace', down: isDown, modifiers: 0 });
   } else if (event.data && event.inputType !== 'insertCompositionText') {
-    done({ e: 'text', text: event.data });
+    done({ e: 'text', text: cut(event.data) });
   }
   typing.value = '';
 });
@@ -316,7 +339,7 @@ document.addEventListener('copy', (event) => { event.preventDefault(); done({ e:
 document.addEventListener('cut', (event) => { event.preventDefault(); done({ e: 'cut' }); });
 document.addEventListener('paste', (event) => {
   event.preventDefault();
-  done({ e: 'paste', text: event.clipboardData.getData('text/plain') });
+  done({ e: 'paste', text: cut(event.clipboardData.getData('text/plain')) });
 });
 
 /// Where text is typed, a keyboard of the screen and the candidates of an input method have their place.

@@ -10,6 +10,7 @@ use egui::{Align, Button, Context, Id, Key, Layout, Modifiers, RichText, TextEdi
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
+use crate::gui::typed::MOST_TYPED;
 use crate::model::{Dialog, FolderEntry, FolderKind, Model, Severity};
 use crate::tr;
 use purpose::Purpose;
@@ -162,7 +163,7 @@ fn path_ui(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, is_
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(&mut state.typed)
             .desired_width(ui.available_width() - 120.0)
-            .char_limit(4096)
+            .char_limit(MOST_TYPED)
             .hint_text(purpose.empty_hint);
         let response = ui.add(field);
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Path")));

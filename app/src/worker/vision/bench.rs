@@ -169,7 +169,8 @@ impl CellBench {
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
         let (sender, measured) = bounded(2);
         let view = ViewSettings { depth_scale: DepthScale::Full, ..ViewSettings::default() };
-        let workers = Workers::start(&source, &view, &connector, sender, &clock, &waker).expect("threads");
+        let workers =
+            Workers::start(&source, &view, &connector, sender, &Arc::default(), &clock, &waker).expect("threads");
         let mut client = connect(&server);
         client.arm().sim().start_simulation().expect("it starts");
         let truth = client.camera().ground_truth().expect("the cell is simulated");

@@ -1,0 +1,154 @@
+//! STOP at a page, while the workbench is given the worst frames to draw that a page can ask for.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use handeye_core::geometry::arm::JointValues;
+use handeye_sim_link::client::cell::{Arm, CellPaths};
+use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
+use handeye_tests::CellProcess;
+use handeye_tests::served::Served;
+use rand::{RngExt as _, SeedableRng as _};
+use serde_json::{Value, json};
+use tungstenite::Message;
+
+/// From STOP to an arm at rest, by the clock of the cell \[s\].
+const AT_REST_S: f64 = 0.3;
+
+/// An arm that stays where it is for so long \[s\] is at rest.
+const STILL_S: f64 = 0.4;
+
+/// Letters that are pasted at once: as many as a message has room for.
+const PASTED: usize = 60_000;
+
+/// Longer than anything takes on a busy machine.
+const PATIENCE: Duration = Duration::from_mins(4);
+
+type Page = tungstenite::WebSocket<std::net::TcpStream>;
+
+fn tell(page: &mut Page, what: &Value) {
+    page.send(Message::text(what.to_string())).expect("sent");
+}
+
+fn key(name: &str, modifiers: u8, down: bool) -> Value {
+    json!({"e": "key", "key": name, "down": down, "modifiers": modifiers})
+}
+
+/// A page that has the palette open and pastes into it as fast as frames come, on the largest screen there is. Once for every
+/// time that it is asked to, it presses Esc.
+fn burden(mut page: Page, ends: &AtomicBool, escapes: &AtomicU64, frames: &AtomicU64) {
+    tell(&mut page, &json!({"t": "screen", "width": 8000.0, "height": 8000.0, "scale": 2.0, "touch": false}));
+    tell(&mut page, &json!({"t": "reads", "reads": true}));
+    page.get_ref().set_read_timeout(Some(Duration::from_millis(5))).expect("set");
+    let text = "Wide letters of every kind ÄÖÜ äöü ".repeat(PASTED / 35);
+    let open =
+        |name, modifiers| json!({"t": "input", "events": [key(name, modifiers, true), key(name, modifiers, false)]});
+    tell(&mut page, &open("k", 2));
+    let mut pressed = 0;
+    while !ends.load(Ordering::Acquire) {
+        if escapes.load(Ordering::Acquire) > pressed {
+            pressed += 1;
+            tell(&mut page, &open("Escape", 0));
+            tell(&mut page, &open("k", 2));
+        }
+        let message = match page.read() {
+            Ok(message) => message,
+            Err(tungstenite::Error::Io(_)) => continue,
+            Err(error) => panic!("the page is closed: {error}"),
+        };
+        if let Message::Binary(bytes) = message {
+            let end = 4 + u32::from_le_bytes(bytes[..4].try_into().expect("four bytes")) as usize;
+            let head: Value = serde_json::from_slice(&bytes[4..end]).expect("JSON");
+            tell(&mut page, &json!({"t": "shown", "number": head["number"]}));
+            tell(&mut page, &json!({"t": "input", "events": [{"e": "paste", "text": text}]}));
+            frames.fetch_add(1, Ordering::AcqRel);
+        }
+    }
+}
+
+/// Another client of the cell.
+fn arm(cell: &CellProcess) -> Arm {
+    let endpoint = Endpoint::local(cell.port());
+    Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell")
+}
+
+fn time_s(arm: &mut Arm) -> f64 {
+    arm.sim().get_simulation_time().expect("a call")
+}
+
+/// When the arm has last moved, once it is at rest.
+fn last_moved_s(arm: &mut Arm) -> f64 {
+    let (mut joints, mut moved_s) = (arm.joint_values().expect("a call"), time_s(arm));
+    loop {
+        let (now, now_s) = (arm.joint_values().expect("a call"), time_s(arm));
+        if now != joints {
+            (joints, moved_s) = (now, now_s);
+        }
+        if now_s - moved_s > STILL_S {
+            return moved_s;
+        }
+    }
+}
+
+fn until_moving(arm: &mut Arm, from: &JointValues) {
+    let deadline = Instant::now() + PATIENCE;
+    while arm.joint_values().expect("a call") == *from {
+        assert!(Instant::now() < deadline, "the arm does not move");
+    }
+}
+
+#[test]
+fn stop_at_a_page_waits_for_no_frame() {
+    let cell = CellProcess::start(&[]);
+    let mut watch = arm(&cell);
+    watch.sim().start_simulation().expect("it starts");
+    let served = Served::start(&["--connect", &Endpoint::local(cell.port()).to_string()]);
+    let (ends, escapes, frames) = (AtomicBool::new(false), AtomicU64::new(0), AtomicU64::new(0));
+    let driver = served.page("driver");
+    let mut watcher = served.page("watcher");
+    std::thread::scope(|scope| {
+        scope.spawn(|| burden(driver, &ends, &escapes, &frames));
+        // Whatever moves the arm: a client whose motions are none of the window's business.
+        let mut mover = arm(&cell);
+        let start = watch.joint_values().expect("a call");
+        let limits = MotionLimits::uniform(6, 0.5, 2.0, 20.0);
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(35);
+        let deadline = Instant::now() + PATIENCE;
+        while frames.load(Ordering::Acquire) < 3 {
+            assert!(Instant::now() < deadline, "there are no frames");
+        }
+        let (began, drawn) = (Instant::now(), frames.load(Ordering::Acquire));
+        let mut took = Vec::new();
+        for trial in 0..100 {
+            let at = watch.joint_values().expect("a call");
+            let mut goal = start;
+            goal[0] += if at[0] > start[0] { -2.0 } else { 2.0 };
+            let moving = scope.spawn(|| {
+                // It is stopped on its way.
+                let _stopped = mover.move_to_joints(&goal, &limits, &CancelToken::default()).is_ok();
+                mover
+            });
+            until_moving(&mut watch, &at);
+            let until_s = time_s(&mut watch) + random.random_range(0.0..0.5);
+            while time_s(&mut watch) < until_s {}
+            let pressed_s = time_s(&mut watch);
+            if trial % 2 == 0 {
+                tell(&mut watcher, &json!({"t": "stop"}));
+            } else {
+                escapes.fetch_add(1, Ordering::AcqRel);
+            }
+            took.push(last_moved_s(&mut watch) - pressed_s);
+            mover = moving.join().expect("it ends");
+        }
+        let drawn = frames.load(Ordering::Acquire) - drawn;
+        ends.store(true, Ordering::Release);
+        took.sort_by(f64::total_cmp);
+        println!(
+            "{drawn} frames of {:.2} s each; at rest after {:.3} s in the median, {:.3} s at most, of the cell's time",
+            began.elapsed().as_secs_f64() / drawn.max(1) as f64,
+            took[50],
+            took[99]
+        );
+        assert!(took[99] <= AT_REST_S, "{took:?}");
+    });
+}
