@@ -110,5 +110,5 @@ fn speed_said(moves: Moves, share: f64) -> (Text, Text) {
         joint = format!("{:.1}", JOG_JOINT_SPEED_RAD_S.to_degrees() * share),
         pose = format!("{:.0}", limits::SEQUENCE.joint_velocity.to_degrees() * share)
     );
-    (text!("{percent} % · jog along a line {line} mm/s", percent = percent, line = line), more)
+    (text!("{percent} % · line {line} mm/s", percent = percent, line = line), more)
 }

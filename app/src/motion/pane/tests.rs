@@ -145,13 +145,13 @@ fn frame_step_and_speed_are_chosen() {
     let sent = pane.click("Step 10 mm, 10°");
     let [Command::SetJog(jog)] = sent[..] else { panic!("{sent:?}") };
     assert_eq!(jog.step, JogStep::Step { metres: 0.01, radians: 10.0_f64.to_radians() });
-    assert!(pane.sees("50 % · jog along a line 125 mm/s"), "no arm can be hurt in the built-in cell");
+    assert!(pane.sees("50 % · line 125 mm/s"), "no arm can be hurt in the built-in cell");
     pane.model().source = CellSource::Address("tcp://127.0.0.1:23000".to_owned());
     pane.steps();
-    assert!(pane.sees("25 % · jog along a line 62 mm/s"), "there may be a real arm behind an address");
+    assert!(pane.sees("25 % · line 62 mm/s"), "there may be a real arm behind an address");
     pane.model().view.jog.speed = Some(0.8);
     pane.steps();
-    assert!(pane.sees("80 % · jog along a line 200 mm/s") && pane.nothing_is_cut_off());
+    assert!(pane.sees("80 % · line 200 mm/s") && pane.nothing_is_cut_off());
 }
 
 #[test]

@@ -159,6 +159,6 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     pane.model().messages.say_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);
     pane.steps();
     assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
-    assert!(pane.sees("V2 was skipped: the board was not found") && pane.sees("it was broken off"));
+    assert!(pane.sees("Skipped V2: the board was not found") && pane.sees("it was broken off"));
     assert!(pane.is_enabled(PLANNED) && pane.nothing_is_cut_off());
 }
