@@ -72,7 +72,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let observations = solve::read(&args.path, &cancel)?.seen.observations;
     let calibration = calibrate(&observations, Method::Joint, &cancel).map_err(|error| match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
-        error => solve::unsolved(error, &args.path),
+        error => solve::unsolved(error, &args.path, &observations, &cancel),
     })?;
     if calibration.hand_eye.is_none() || calibration.joint.is_none() {
         return Err(Failure::unusable(anyhow::anyhow!(

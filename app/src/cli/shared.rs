@@ -33,7 +33,7 @@ pub fn folders(paths: &[PathBuf], options: Options, cancel: &CancelToken) -> Res
     for (((i, path), input), calibration) in paths.iter().enumerate().zip(inputs).zip(calibrations) {
         let job = solve::job(&input, Method::Joint, options);
         let examined = worker::examined(&job, calibration, cancel.into());
-        let mut solved = examined.map_err(|error| solve::unsolved(error, path))?;
+        let mut solved = examined.map_err(|error| solve::unsolved(error, path, &input.seen.observations, cancel))?;
         let others = digests.iter().enumerate().filter(|(j, _)| *j != i);
         let others: Vec<&str> = others.map(|(_, digest)| digest.as_str()).collect();
         solved.result.provenance.options.insert(OPTION.to_owned(), others.into());

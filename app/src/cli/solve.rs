@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::anyhow;
+use handeye_core::diagnose::doctor::diagnose;
+use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions};
 use handeye_core::estimate::handeye::{HandEyeError, Mode};
-use handeye_core::estimate::{CalibrateError, Method, ObservedView, Options};
+use handeye_core::estimate::{CalibrateError, Method, Observations, ObservedView, Options};
 use handeye_core::plan::guided::record::GuidedRecord;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::template::{CHOICE, template};
@@ -193,7 +195,8 @@ pub fn folder(
     let input = read(path, cancel)?;
     let recorded = Some((path.to_path_buf(), Arc::clone(&input.document)));
     let job = SolveJob { recorded, goal_m, truth, ..job(&input, method, options) };
-    let solved = worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path))?;
+    let solved =
+        worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path, &input.seen.observations, cancel))?;
     Ok(Solution::new(path, input, solved))
 }
 
@@ -214,13 +217,34 @@ pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
     }
 }
 
-/// Where there is no answer the data may be at fault, and the doctor says which.
-pub fn unsolved(error: CalibrateError, folder: &Path) -> Failure {
+/// Where there is no answer the data may be at fault: how the poses were written is said at once, the rest by the doctor.
+pub fn unsolved(error: CalibrateError, folder: &Path, observations: &Observations, cancel: &CancelToken) -> Failure {
     match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
         CalibrateError::NeedsCorners { .. } => Failure::unusable(error),
-        error => Failure::failed(anyhow!("{error}; `handeye doctor {}` examines the data", folder.display())),
+        error => match misread(observations, cancel) {
+            Some(why) => Failure::failed(anyhow!("{error}: {why}")),
+            None => Failure::failed(anyhow!("{error}; `handeye doctor {}` examines the data", folder.display())),
+        },
     }
+}
+
+/// That the poses were written otherwise than was stated, in another unit or direction, if they were.
+fn misread(observations: &Observations, cancel: &CancelToken) -> Option<String> {
+    let findings = diagnose(observations, None, &FindingOptions::default(), cancel).findings;
+    let is_so = |finding: &&Finding| {
+        matches!(
+            finding.code,
+            FindingCode::WrongLengthUnit
+                | FindingCode::WrongAngleUnit
+                | FindingCode::WrongQuaternionOrder
+                | FindingCode::InvertedPoses
+                | FindingCode::WrongMode
+                | FindingCode::InvertedTargetPoses
+                | FindingCode::ShiftedPoses
+        )
+    };
+    findings.iter().find(is_so).map(ToString::to_string)
 }
 
 /// A data set as a session would have it.

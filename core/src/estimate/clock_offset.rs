@@ -12,6 +12,7 @@
 
 use super::handeye::closed_form::{self, ClosedFormSolution};
 use super::handeye::consensus::consensus;
+use super::handeye::numbering::Turns;
 use super::handeye::pose_graph::{self, PoseGraphSolution, misfit};
 use super::handeye::{HandEyeError, PosePair, subset};
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
@@ -326,7 +327,7 @@ fn begin(pairs: &[PosePair]) -> Result<ClosedFormSolution, HandEyeError> {
     let outcomes: Vec<_> = closed_form::all().iter().map(|form| form.solve(pairs)).collect();
     let solved: Vec<ClosedFormSolution> = outcomes.iter().filter_map(|outcome| outcome.clone().ok()).collect();
     let of_view = |solution: &ClosedFormSolution, view: usize, _| misfit(&pairs[view], solution, 1.0);
-    consensus(pairs, &solved, None, of_view).map(|found| found.solution).ok_or_else(|| {
+    consensus(pairs, &solved, &Turns::default(), of_view).map(|found| found.solution).ok_or_else(|| {
         let none =
             HandEyeError::NoSolution { method: pose_graph::METHOD, views: pairs.len(), reason: "no closed form" };
         outcomes.into_iter().find_map(Result::err).unwrap_or(none)

@@ -9,9 +9,10 @@ use super::{
     ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
-use crate::estimate::handeye::consensus::{Consensus, half_turn_about};
+use crate::estimate::handeye::consensus::Consensus;
 use crate::estimate::handeye::joint::{JointProblem, LensPrior, camera_from_target};
 use crate::estimate::handeye::motion::MIN_VIEWS;
+use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair};
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::statistics::median_high;
@@ -71,10 +72,10 @@ impl<'a> Prepared<'a> {
             let problem = JointProblem::new(mode, &board, &views);
             let begin = refine::start(&problem, &observations.target, &lens, &pairs, &calibration.methods);
             let Ok(found) = &begin else { break begin };
-            for i in &found.turned {
-                renumber(&mut views[*i], &mut pairs[*i], &mut alternatives[*i], &observations.target);
+            for (i, quarters) in &found.turned {
+                renumber(&mut views[*i], &mut pairs[*i], &mut alternatives[*i], &observations.target, *quarters);
                 let view = &mut calibration.views[seen[*i].index];
-                view.renumbered = !view.renumbered;
+                view.quarter_turns = (view.quarter_turns + quarters) % 4;
             }
             let changed = two_poses::take_agreeing(&mut pairs, &mut alternatives, &found.solution);
             if !changed && found.turned.is_empty() {
@@ -167,12 +168,18 @@ impl Session<'_> {
 /// Rounds of a start and of the poses that agree with it: a better start may find more of them.
 const ROUNDS: usize = 5;
 
-/// Numbers the corners of a view from the other end of the target, and its poses with them.
-fn renumber(view: &mut View, pair: &mut PosePair, alternative: &mut Option<Pose<Camera, Target>>, target: &TargetSpec) {
-    observation::renumber(&mut view.corners, target);
-    let half_turn = half_turn_about(&target.centre());
+/// Numbers the corners of a view from another corner of the target, and its poses with them.
+fn renumber(
+    view: &mut View,
+    pair: &mut PosePair,
+    alternative: &mut Option<Pose<Camera, Target>>,
+    target: &TargetSpec,
+    quarters: usize,
+) {
+    observation::renumber(&mut view.corners, target, quarters);
+    let turns = Turns::of(target);
     for pose in std::iter::once(&mut pair.camera_from_target).chain(alternative) {
-        *pose = Pose::from_isometry(pose.isometry() * half_turn);
+        *pose = turns.turned(pose, quarters);
     }
 }
 

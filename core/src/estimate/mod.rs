@@ -518,8 +518,8 @@ pub struct ViewResult {
     pub distance: Option<Distance>,
     /// Corners of it that were left out as outliers, by their index.
     pub corners_aside: Vec<usize>,
-    /// Whether its target was numbered from the other end than detected, to agree with the others.
-    pub renumbered: bool,
+    /// By how many quarter turns its target was numbered from another corner than detected, to agree with the others.
+    pub quarter_turns: usize,
 }
 
 impl ViewResult {
@@ -536,7 +536,7 @@ impl ViewResult {
             camera_from_target: None,
             distance: None,
             corners_aside: Vec::new(),
-            renumbered: false,
+            quarter_turns: 0,
         }
     }
 }

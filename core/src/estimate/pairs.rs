@@ -8,6 +8,7 @@ use super::{
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::consensus;
+use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::pose_graph::{self, METHOD, PoseGraphSolution, misfit};
 use crate::estimate::handeye::screening::{Distance, Estimator, Fit, Judged, screened};
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, scale};
@@ -108,7 +109,7 @@ impl Begin {
         let methods = &calibration.methods;
         let candidates: Vec<_> = methods.iter().filter_map(|m| m.outcome.clone().ok()).collect();
         let of_view = |solution: &ClosedFormSolution, view: usize, _| misfit(&pairs[view], solution, 1.0);
-        let found = consensus(pairs, &candidates, None, of_view).ok_or_else(|| {
+        let found = consensus(pairs, &candidates, &Turns::default(), of_view).ok_or_else(|| {
             let first = methods.iter().find_map(|m| m.outcome.clone().err());
             first.unwrap_or_else(|| none("no closed form gave a finite answer"))
         })?;

@@ -1,18 +1,19 @@
 //! The joint estimate within a calibration: its start, outliers, and which unknowns the data support.
 
-use nalgebra::{Isometry3, Vector2};
+use nalgebra::Vector2;
 
 use super::bend::{Deflection, may_be_shown};
 use super::lens::Lens;
 use super::{CalibrateError, JointOffsets, MethodResult, Options, TargetSize, size};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
-use crate::estimate::handeye::consensus::{Consensus, consensus, half_turn_about};
+use crate::estimate::handeye::consensus::{Consensus, consensus};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::residual_distortion::{corrected, with_its_error, with_shown_distortion};
 use crate::estimate::handeye::joint::{
     self, CornerWeights, Free, JointProblem, JointSolution, JointStart, ShownDistortion, with_shown_field,
 };
+use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::{HandEyeError, PosePair, determined};
 use crate::estimate::residuals::squared_residuals;
 use crate::estimate::uncertainty::widening::Widening;
@@ -34,7 +35,7 @@ pub struct Refined {
     pub distortion: Option<ShownDistortion>,
 }
 
-/// The start that most views agree with, and the views numbered from the other end.
+/// The start that most views agree with, and the views numbered from another corner.
 pub fn start(
     problem: &JointProblem<'_>,
     target: &TargetSpec,
@@ -45,15 +46,14 @@ pub fn start(
     let candidates: Vec<ClosedFormSolution> = methods.iter().filter_map(|m| m.outcome.clone().ok()).collect();
     let sampled: Vec<View> = problem.views.iter().map(sampled).collect();
     let problem = &JointProblem { views: &sampled, ..*problem };
-    let half_turn: Option<Isometry3<f64>> = target.is_symmetric().then(|| half_turn_about(&target.centre()));
-    let misfit = |solution: &ClosedFormSolution, view: usize, turned: bool| {
-        let mut solution = *solution;
-        if let (true, Some(half_turn)) = (turned, &half_turn) {
-            solution.anchor_from_target = Pose::from_isometry(solution.anchor_from_target.isometry() * half_turn);
-        }
+    let turns = Turns::of(target);
+    let misfit = |solution: &ClosedFormSolution, view: usize, quarters: usize| {
+        // The corners are as they were detected: it is the target that is turned the other way.
+        let anchor_from_target = turns.turned(&solution.anchor_from_target, 4 - quarters);
+        let solution = ClosedFormSolution { anchor_from_target, ..*solution };
         squared_residuals(problem, (&lens.intrinsics, &lens.shape), &solution, &problem.views[view], CAP_PX).sqrt()
     };
-    consensus(pairs, &candidates, half_turn.as_ref(), misfit).ok_or_else(|| {
+    consensus(pairs, &candidates, &turns, misfit).ok_or_else(|| {
         methods.iter().find_map(|m| m.outcome.clone().err()).unwrap_or(HandEyeError::NoSolution {
             method: "the closed forms",
             views: pairs.len(),

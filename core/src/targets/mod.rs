@@ -149,17 +149,39 @@ impl TargetSpec {
         Point3::new(half.x, half.y, 0.0)
     }
 
-    /// Whether the printed pattern looks the same after half a turn, so that no detector can tell its ends apart.
-    ///
-    /// A chessboard does when the sum of its inner corners per row and column is even (9×7), and does not when it is
-    /// odd (9×6, 10×7). A plain grid of dots always does; a shifted one does when its rows are even in number. Markers
-    /// never do.
+    /// Whether the printed pattern looks the same after a turn, so that no detector can tell its ends apart.
     pub fn is_symmetric(&self) -> bool {
+        !self.quarter_turns().is_empty()
+    }
+
+    /// After how many quarter turns about its middle the printed pattern looks the same.
+    ///
+    /// A chessboard does after half a turn when the sum of its inner corners per row and column is even (9×7), and does not when it
+    /// is odd (9×6, 10×7); one that has as many rows as columns, an even number (8×8), after a quarter, too. A plain grid of dots does after
+    /// half a turn, a square one after a quarter; a shifted one after half a turn when its rows are even in number. Markers never do.
+    pub fn quarter_turns(&self) -> &'static [usize] {
+        let half: &[usize] = &[2];
+        let every: &[usize] = &[1, 2, 3];
         match self {
-            Self::Chessboard(grid) => (grid.columns + grid.rows) % 2 == 0,
-            Self::Circles(_) => true,
-            Self::AsymmetricCircles(grid) => grid.rows % 2 == 0,
-            Self::Charuco(_) | Self::AprilGrid(_) | Self::AprilTag(_) => false,
+            Self::Chessboard(grid) if grid.columns == grid.rows && grid.rows.is_multiple_of(2) => every,
+            Self::Chessboard(grid) if (grid.columns + grid.rows).is_multiple_of(2) => half,
+            Self::Circles(grid) if grid.columns == grid.rows => every,
+            Self::Circles(_) => half,
+            Self::AsymmetricCircles(grid) if grid.rows.is_multiple_of(2) => half,
+            Self::Chessboard(_) | Self::AsymmetricCircles(_) => &[],
+            Self::Charuco(_) | Self::AprilGrid(_) | Self::AprilTag(_) => &[],
+        }
+    }
+
+    /// The number that a point has when the target is counted from another corner, so many of its [`Self::quarter_turns`] away.
+    pub fn renumbered(&self, index: usize, quarter_turns: usize) -> usize {
+        let Grid { columns, rows, .. } = self.grid();
+        let (column, row) = (index % columns, index / columns);
+        match quarter_turns % 4 {
+            0 => index,
+            1 => (rows - 1 - column) * columns + row,
+            2 => self.len() - 1 - index,
+            _ => column * columns + (columns - 1 - row),
         }
     }
 

@@ -104,11 +104,11 @@ impl View {
     }
 }
 
-/// Numbers the corners of a [symmetric](TargetSpec::is_symmetric) target from its other end, and sorts them by number.
-pub fn renumber(corners: &mut [Corner], target: &TargetSpec) {
-    let count = target.points().len();
+/// Numbers the corners of a target from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away, and sorts them
+/// by number.
+pub fn renumber(corners: &mut [Corner], target: &TargetSpec, quarter_turns: usize) {
     for corner in corners.iter_mut() {
-        corner.index = count - 1 - corner.index;
+        corner.index = target.renumbered(corner.index, quarter_turns);
     }
     corners.sort_by_key(|corner| corner.index);
 }

@@ -41,6 +41,25 @@ fn only_boards_of_odd_sum_have_two_different_ends() {
 }
 
 #[test]
+fn a_target_that_is_counted_from_another_corner_has_its_points_where_it_is_turned() {
+    use crate::estimate::handeye::numbering::Turns;
+    let grid = |columns| Grid { columns, rows: 8, square_m: 0.01 };
+    let of = [TargetSpec::Circles(grid(8)), TargetSpec::Chessboard(grid(8)), TargetSpec::Circles(grid(5))];
+    for (target, ways) in of.into_iter().zip([4, 4, 2]) {
+        let turns = Turns::of(&target);
+        assert_eq!(turns.quarters().count(), ways);
+        for (quarters, index) in
+            turns.quarters().flat_map(|quarters| (0..target.len()).map(move |index| (quarters, index)))
+        {
+            let own = target.point(index);
+            let renumbered = target.point(target.renumbered(index, quarters));
+            let there = turns.motion(quarters).map_or(renumbered, |motion| motion * renumbered);
+            assert!((there - own).norm() < 1e-12, "{target} {quarters} {index}");
+        }
+    }
+}
+
+#[test]
 fn odd_rows_of_asymmetric_dots_are_shifted_by_half_their_distance() {
     let target = TargetSpec::AsymmetricCircles(Grid { columns: 4, rows: 11, square_m: 0.02 });
     let points = target.points();

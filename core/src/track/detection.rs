@@ -234,15 +234,17 @@ impl Eye<'_> {
     }
 
     fn number_like(&self, expected: &Isometry3<f64>, corners: &mut [Corner]) {
-        let count = self.grid().len();
         let distance = |index: usize, px: Vector2<f64>| {
             self.camera.project(&(expected * self.target.point(index))).map_or(0.0, |at| (at - px).norm_squared())
         };
-        let as_is: f64 = corners.iter().map(|corner| distance(corner.index, corner.px)).sum();
-        let turned: f64 = corners.iter().map(|corner| distance(count - 1 - corner.index, corner.px)).sum();
-        if turned < as_is {
+        let apart = |quarters: usize| -> f64 {
+            corners.iter().map(|corner| distance(self.target.renumbered(corner.index, quarters), corner.px)).sum()
+        };
+        let ways = std::iter::once(0).chain(self.target.quarter_turns().iter().copied());
+        let nearest = ways.map(|quarters| (apart(quarters), quarters)).min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, quarters)) = nearest.filter(|(_, quarters)| *quarters != 0) {
             for corner in corners {
-                corner.index = count - 1 - corner.index;
+                corner.index = self.target.renumbered(corner.index, quarters);
             }
         }
     }

@@ -360,6 +360,54 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
     assert!(goal.value("expected_error_95").expect("stated") > 15.0, "{goal:?}");
 }
 
+/// Radians that are read as degrees leave an arm that hardly turns, and a target of another unit a robot of another size.
+#[test]
+fn a_unit_that_was_stated_wrongly_is_named() {
+    use nalgebra::{Isometry3, UnitQuaternion};
+    let setup = Setup { estimated: false, ..Setup::new(Mode::EyeInHand, 16, 721) };
+    let healthy = session(&setup);
+    let changed = |change: &dyn Fn(Isometry3<f64>) -> Isometry3<f64>| {
+        let mut session = healthy.clone();
+        for view in &mut session.views {
+            view.base_from_tip = view.base_from_tip.map(|pose| Pose::from_isometry(change(*pose.isometry())));
+        }
+        session
+    };
+    let vector = |pose: Isometry3<f64>| {
+        let turn = UnitQuaternion::from_scaled_axis(pose.rotation.scaled_axis() * 1f64.to_radians());
+        Isometry3::from_parts(pose.translation, turn)
+    };
+    let rpy = |pose: Isometry3<f64>| {
+        let (roll, pitch, yaw) = pose.rotation.euler_angles();
+        let turn = UnitQuaternion::from_euler_angles(roll.to_radians(), pitch.to_radians(), yaw.to_radians());
+        Isometry3::from_parts(pose.translation, turn)
+    };
+    let inverse = |pose: Isometry3<f64>| vector(pose.inverse()).inverse();
+    let cancel = CancelToken::default();
+    let found = |session: &Observations| diagnose(session, None, &FindingOptions::default(), &cancel).findings;
+    for change in [&vector as &dyn Fn(Isometry3<f64>) -> Isometry3<f64>, &rpy, &inverse] {
+        let findings = found(&changed(change));
+        let named = findings.iter().find(|f| f.code == FindingCode::WrongAngleUnit).expect("the unit is named");
+        assert!(named.to_string().contains("are in radians where degrees were stated"), "{named}");
+    }
+    for (times, said) in [
+        (1e3, "in millimetres where metres"),
+        (1e-3, "in metres where millimetres"),
+        (10.0, "is 0.1 times the true one, a power of ten"),
+        (0.01, "is 100 times the true one, a power of ten"),
+        (25.4, "is 1/25.4 times the true one, by an inch"),
+        (1.0 / 25.4, "is 25.4 times the true one, by an inch"),
+    ] {
+        let scaled = |mut pose: Isometry3<f64>| {
+            pose.translation.vector *= times;
+            pose
+        };
+        let findings = found(&changed(&scaled));
+        let named = findings.iter().find(|f| f.code == FindingCode::WrongLengthUnit).expect("the unit is named");
+        assert!(named.to_string().contains(said), "{times}: {named}");
+    }
+}
+
 #[test]
 fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor() {
     // Circles look the same from both ends.
@@ -367,13 +415,13 @@ fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor
     observations.target = TargetSpec::Circles(GRID);
     for n in [2, 3, 9, 13] {
         let corners = observations.views[n].corners.as_mut().expect("seen");
-        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(GRID));
+        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(GRID), 2);
     }
     let cancel = CancelToken::default();
     let (true_mount_from_camera, _) = faulty::links(Mode::EyeInHand);
     for method in [Method::Joint, Method::ClosedForm("park_martin")] {
         let mut calibration = calibrate(&observations, method, &cancel).expect("an answer");
-        let renumbered = calibration.views.iter().filter(|view| view.renumbered).count();
+        let renumbered = calibration.views.iter().filter(|view| view.quarter_turns != 0).count();
         assert_eq!(renumbered, 4, "{method:?}");
         for result in &calibration.methods {
             let found = result.outcome.as_ref().expect("an answer").mount_from_camera;

@@ -148,7 +148,7 @@ fn with_everything_found(calibration: &mut handeye_core::estimate::Calibration) 
         view.distance = Some(Distance { of_limit: 4.0, metres: 8e-3, radians: 0.02 });
     }
     calibration.views[3].corners_aside = vec![1, 2];
-    calibration.views[4].renumbered = true;
+    calibration.views[4].quarter_turns = 2;
     let joint = calibration.joint.as_mut().expect("a joint estimate");
     joint.shape = Some(ShapeEstimate {
         shape: BoardShape { warp_m: [4e-4, -1e-4], scale: 1.0 },

@@ -1,4 +1,4 @@
-//! Gross hypotheses: poses inverted or in another unit, quaternion order, camera elsewhere, images and poses out of step.
+//! Gross hypotheses: poses inverted or in another unit of length or of angles, quaternion order, camera elsewhere, images and poses out of step.
 //!
 //! Each is a change of the reported poses. Under each the closed forms are solved anew, and the distance between where
 //! the chain puts the board and where the camera saw it is compared: it is measured on the camera's side, in millimetres,
@@ -39,6 +39,22 @@ enum Order {
     WLast,
 }
 
+/// How the angles of rotations were written that are in radians and were read as degrees. The other way round the table is refused:
+/// degrees are soon more than the two turns that a controller reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Angles {
+    /// Axis times angle.
+    Vector,
+    /// Roll, pitch and yaw.
+    Rpy,
+}
+
+/// Turns of radians that were read as degrees are no larger, radians: three angles of half a turn each.
+const LARGEST_OF_DEGREES: f64 = 3.0 * std::f64::consts::PI * std::f64::consts::PI / 180.0;
+
+/// Factors by which lengths of different units differ, besides the thousand: powers of ten, and the millimetres and metres of an inch.
+const OTHER_UNITS: [f64; 8] = [0.1, 10.0, 1e-2, 1e2, 25.4, 1.0 / 25.4, 0.0254, 1.0 / 0.0254];
+
 /// A change of the reported poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Change {
@@ -46,6 +62,8 @@ pub(super) struct Change {
     order: Option<Order>,
     /// The quaternion was mixed up before the pose was inverted on reading.
     order_in_inverse: bool,
+    /// Degrees are radians.
+    angles: Option<Angles>,
     /// Factor on all lengths.
     pub unit: f64,
     /// Which row of the table each image belongs to.
@@ -53,13 +71,20 @@ pub(super) struct Change {
 }
 
 impl Change {
-    pub const NONE: Self =
-        Self { inverted: false, order: None, order_in_inverse: false, unit: 1.0, pairing: Pairing::AsGiven };
+    pub const NONE: Self = Self {
+        inverted: false,
+        order: None,
+        order_in_inverse: false,
+        angles: None,
+        unit: 1.0,
+        pairing: Pairing::AsGiven,
+    };
 
     /// Number of things changed.
     fn count(&self) -> usize {
         usize::from(self.inverted)
             + usize::from(self.order.is_some())
+            + usize::from(self.angles.is_some())
             + usize::from(self.unit != 1.0)
             + usize::from(self.pairing != Pairing::AsGiven)
     }
@@ -72,6 +97,9 @@ impl Change {
         }
         if self.order.is_some() {
             codes.push(FindingCode::WrongQuaternionOrder);
+        }
+        if self.angles.is_some() {
+            codes.push(FindingCode::WrongAngleUnit);
         }
         if self.unit != 1.0 {
             codes.push(FindingCode::WrongLengthUnit);
@@ -87,14 +115,11 @@ impl Change {
     }
 
     fn of_pose(&self, pose: &Pose<Base, Tip>) -> Pose<Base, Tip> {
-        let mut pose = *pose.isometry();
-        if let Some(order) = self.order {
-            if self.order_in_inverse {
-                pose = reordered(&pose.inverse(), order).inverse();
-            } else {
-                pose = reordered(&pose, order);
-            }
-        }
+        let pose = *pose.isometry();
+        let written = if self.order_in_inverse { pose.inverse() } else { pose };
+        let written = self.order.map_or(written, |order| reordered(&written, order));
+        let written = self.angles.map_or(written, |angles| in_radians(&written, angles));
+        let mut pose = if self.order_in_inverse { written.inverse() } else { written };
         pose.translation.vector *= self.unit;
         Pose::from_isometry(if self.inverted { pose.inverse() } else { pose })
     }
@@ -111,9 +136,25 @@ fn reordered(pose: &Isometry3<f64>, order: Order) -> Isometry3<f64> {
     Isometry3::from_parts(pose.translation, UnitQuaternion::from_quaternion(q))
 }
 
+/// The pose of which the angles were read as degrees and are radians.
+fn in_radians(pose: &Isometry3<f64>, angles: Angles) -> Isometry3<f64> {
+    let rotation = match angles {
+        Angles::Vector => UnitQuaternion::from_scaled_axis(pose.rotation.scaled_axis() * 1f64.to_degrees()),
+        Angles::Rpy => {
+            let (roll, pitch, yaw) = pose.rotation.euler_angles();
+            UnitQuaternion::from_euler_angles(roll.to_degrees(), pitch.to_degrees(), yaw.to_degrees())
+        }
+    };
+    Isometry3::from_parts(pose.translation, rotation)
+}
+
 /// Every change that is tried.
 fn changes(sight: &SessionViews) -> Vec<Change> {
     let mut all = changes_of_poses();
+    let is_small = |view: &super::views::SessionView| view.base_from_tip.rotation().angle() < LARGEST_OF_DEGREES;
+    if sight.views.iter().all(is_small) {
+        all.extend(changes_of_angles());
+    }
     all.extend(Pairing::all(sight).into_iter().map(|pairing| Change { pairing, ..Change::NONE }));
     all.sort_by_key(Change::count);
     all
@@ -132,11 +173,27 @@ fn changes_of_poses() -> Vec<Change> {
     for unit in [1.0, 1e-3, 1e3] {
         for inverted in [false, true] {
             for (order, order_in_inverse) in orders {
-                all.push(Change { inverted, order, order_in_inverse, unit, pairing: Pairing::AsGiven });
+                all.push(Change { inverted, order, order_in_inverse, unit, ..Change::NONE });
             }
         }
     }
     all.retain(|c| *c != Change::NONE);
+    all.extend(OTHER_UNITS.map(|unit| Change { unit, ..Change::NONE }));
+    all
+}
+
+/// The ways in which radians may have been read as degrees.
+fn changes_of_angles() -> Vec<Change> {
+    let mut all = Vec::new();
+    for angles in [Angles::Vector, Angles::Rpy] {
+        for unit in [1.0, 1e-3, 1e3] {
+            for inverted in [false, true] {
+                for order_in_inverse in [false, true] {
+                    all.push(Change { angles: Some(angles), unit, inverted, order_in_inverse, ..Change::NONE });
+                }
+            }
+        }
+    }
     all
 }
 
@@ -235,7 +292,7 @@ mod tests {
     #[test]
     fn the_changes_are_all_different() {
         let all = changes_of_poses();
-        assert_eq!(all.len(), 29);
+        assert_eq!(all.len(), 29 + OTHER_UNITS.len());
         for (i, change) in all.iter().enumerate() {
             assert!(!all[..i].contains(change), "{change:?}");
         }

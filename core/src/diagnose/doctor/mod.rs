@@ -171,13 +171,13 @@ pub fn diagnose<'a>(
 
 /// The observations with the corners numbered as the calibration found them to be; `None` when that changes nothing.
 fn renumbered(observations: &Observations, calibration: &Calibration) -> Option<Observations> {
-    if calibration.views.iter().all(|view| !view.renumbered) {
+    if calibration.views.iter().all(|view| view.quarter_turns == 0) {
         return None;
     }
     let mut observations = observations.clone();
     for (view, result) in observations.views.iter_mut().zip(&calibration.views) {
-        if let Some(corners) = view.corners.as_mut().filter(|_| result.renumbered) {
-            observation::renumber(corners, &observations.target);
+        if let Some(corners) = view.corners.as_mut().filter(|_| result.quarter_turns != 0) {
+            observation::renumber(corners, &observations.target, result.quarter_turns);
         }
     }
     Some(observations)

@@ -40,6 +40,8 @@ pub enum FindingCode {
     WrongQuaternionOrder,
     /// Robot poses are in millimetres where metres were stated, or the other way round.
     WrongLengthUnit,
+    /// Angles of the robot poses are in radians where degrees were stated.
+    WrongAngleUnit,
     /// Images and robot poses are out of step by one row.
     ShiftedPoses,
     /// The target is not of the stated size.

@@ -91,15 +91,24 @@ fn corners(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn renumbered(calibration: &Calibration) -> Option<Finding> {
-    let names = named(calibration.views.iter().filter(|view| view.renumbered));
+    let names = named(calibration.views.iter().filter(|view| view.quarter_turns != 0));
     if names.is_empty() {
         return None;
     }
-    let text = text!(
-        "The target looks the same from both ends, and was counted from the other end in {list} to agree with the rest. A \
-         target with an odd sum of inner corners, or a ChArUco board, has no such choice.",
-        list = listed(&names)
-    );
+    let is_square = calibration.views.iter().any(|view| view.quarter_turns % 2 == 1);
+    let text = if is_square {
+        text!(
+            "The target looks the same after a quarter turn, and was counted from another corner in {list} to agree with the rest. A \
+             ChArUco board has no such choice.",
+            list = listed(&names)
+        )
+    } else {
+        text!(
+            "The target looks the same from both ends, and was counted from the other end in {list} to agree with the rest. A \
+             target with an odd sum of inner corners, or a ChArUco board, has no such choice.",
+            list = listed(&names)
+        )
+    };
     let finding = Finding::new(FindingCode::Renumbered, Severity::Info, text).with("views", names.len() as f64, "");
     Some(with_views(finding, &names))
 }

@@ -2,19 +2,17 @@
 //!
 //! A closed form takes every view at its word, and one wrong view spoils it. So besides the closed forms on all views,
 //! small sets of them are solved, and the solution is taken that puts the nearest part of all views nearest (least trimmed
-//! sum of misfits). Targets that look the same after half a turn may be numbered from either end in every view; both are
+//! sum of misfits). Targets that look the same after half a turn, or a quarter, may be numbered from another corner in every view; all are
 //! tried, and the views that have to be renumbered are named.
 //!
 //! # Reference
 //! Fischler & Bolles 1981, "Random sample consensus", CACM 24; Rousseeuw 1984, "Least median of squares regression",
 //! JASA 79 (trimming). The sets are drawn by a fixed rule, so the answer is the same every time.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-
 use super::closed_form::{ClosedForm as _, ClosedFormSolution, ParkMartin};
 use super::draw::Draw;
+use super::numbering::{Turns, unlike_rad};
 use super::{PosePair, subset};
-use crate::geometry::frames::Pose;
 
 /// Sets that are tried: with four in ten views wrong, one in eight sets of four is clean, and fifty leave no doubt.
 const TRIALS: usize = 60;
@@ -25,45 +23,42 @@ const AGREEING: f64 = 0.7;
 /// Views below which nothing can be outvoted.
 const NEED: usize = 5;
 
-/// A start and the views whose target has to be turned by half a turn for it.
+/// Numberings of a set that are solved: of the four of square targets those under which robot and target turn most alike.
+const NUMBERINGS: usize = 1 << (SET - 1);
+
+/// A start and the views whose target has to be numbered otherwise for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Consensus {
     /// The start.
     pub solution: ClosedFormSolution,
-    /// Views, in ascending order, that fit better when the target is numbered from its other end.
-    pub turned: Vec<usize>,
-}
-
-/// Half a turn about the axis through a point of a flat target and across it.
-pub fn half_turn_about(point: &Point3<f64>) -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
-    Translation3::from(point.coords) * turn * Translation3::from(-point.coords)
+    /// Views, in ascending order, that fit better when the target is numbered from another corner, and the quarter turns.
+    pub turned: Vec<(usize, usize)>,
 }
 
 /// The candidate that most views agree with.
 ///
-/// `candidates` are the closed forms on all views. `misfit(solution, view, turned)` is how badly a view fits, in pixels or
-/// any unit, not finite where it has no image; `half_turn` is the motion of the target frame by which a symmetric target
-/// comes to look the same, `None` for a target that does not. `None` when no candidate has a finite misfit.
+/// `candidates` are the closed forms on all views. `misfit(solution, view, quarters)` is how badly a view fits that is numbered by so
+/// many quarter turns otherwise, in pixels or any unit, not finite where it has no image; `turns` are the ways to number the target.
+/// `None` when no candidate has a finite misfit.
 pub fn consensus(
     pairs: &[PosePair],
     candidates: &[ClosedFormSolution],
-    half_turn: Option<&Isometry3<f64>>,
-    misfit: impl Fn(&ClosedFormSolution, usize, bool) -> f64,
+    turns: &Turns,
+    misfit: impl Fn(&ClosedFormSolution, usize, usize) -> f64,
 ) -> Option<Consensus> {
     let judged = subset::spread(pairs.len(), subset::MOST_VIEWS);
-    let either = |solution: &ClosedFormSolution, view: usize| {
-        let plain = misfit(solution, view, false);
-        let turned = if half_turn.is_some() { misfit(solution, view, true) } else { f64::INFINITY };
-        (plain, turned)
+    // The first of equals, which is as it was detected.
+    let best_way = |solution: &ClosedFormSolution, view: usize| {
+        let ways = turns.quarters().map(|quarters| (misfit(solution, view, quarters), quarters));
+        ways.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
     };
     let score = |solution: &ClosedFormSolution| {
-        let mut misfits: Vec<f64> = judged.iter().map(|&view| either(solution, view)).map(|(a, b)| a.min(b)).collect();
+        let mut misfits: Vec<f64> = judged.iter().map(|&view| best_way(solution, view).0).collect();
         misfits.sort_by(f64::total_cmp);
         let agreeing = if pairs.len() < NEED { misfits.len() } else { trimmed(misfits.len()) };
         misfits[..agreeing].iter().sum::<f64>()
     };
-    let drawn = if pairs.len() < NEED { Vec::new() } else { drawn(pairs, half_turn) };
+    let drawn = if pairs.len() < NEED { Vec::new() } else { drawn(pairs, turns) };
     let best = candidates
         .iter()
         .chain(&drawn)
@@ -71,21 +66,18 @@ pub fn consensus(
         .filter(|(score, _)| score.is_finite())
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let solution = *best.1;
-    let mut turned: Vec<usize> = (0..pairs.len())
-        .filter(|&view| {
-            let (plain, turned) = either(&solution, view);
-            turned < plain
-        })
-        .collect();
-    if turned.len() * 2 > pairs.len()
-        && let Some(half_turn) = half_turn
-    {
-        // Numbering all views from the other end is the same target in another frame; fewer changes are easier to follow.
-        turned = (0..pairs.len()).filter(|view| !turned.contains(view)).collect();
-        let anchor_from_target = Pose::from_isometry(solution.anchor_from_target.isometry() * half_turn);
-        return Some(Consensus { solution: ClosedFormSolution { anchor_from_target, ..solution }, turned });
+    let quarters: Vec<usize> = (0..pairs.len()).map(|view| best_way(&solution, view).1).collect();
+    // Numbering all views otherwise is the same target in another frame; fewer changes are easier to follow.
+    let count = |way: usize| quarters.iter().filter(|it| **it == way).count();
+    let mut common = 0;
+    for way in turns.quarters() {
+        if count(way) > count(common) {
+            common = way;
+        }
     }
-    Some(Consensus { solution, turned })
+    let anchor_from_target = turns.turned(&solution.anchor_from_target, 4 - common);
+    let turned = quarters.iter().map(|it| (it + 4 - common) % 4).enumerate().filter(|(_, it)| *it != 0).collect();
+    Some(Consensus { solution: ClosedFormSolution { anchor_from_target, ..solution }, turned })
 }
 
 /// How many of so many views a start has to agree with.
@@ -94,33 +86,40 @@ fn trimmed(count: usize) -> usize {
 }
 
 /// Solutions of small sets of views.
-fn drawn(pairs: &[PosePair], half_turn: Option<&Isometry3<f64>>) -> Vec<ClosedFormSolution> {
+fn drawn(pairs: &[PosePair], turns: &Turns) -> Vec<ClosedFormSolution> {
     let mut solutions = Vec::new();
     let mut draw = Draw::new(0x9e37_79b9_7f4a_7c15);
-    // With two numberings of every view but the first there are eight times as many sets.
-    let numberings = if half_turn.is_some() { 1usize << (SET - 1) } else { 1 };
     for _ in 0..TRIALS {
-        let set = draw.distinct(pairs.len(), SET);
-        for numbering in 0..numberings {
-            let turned = |k: usize| k > 0 && numbering >> (k - 1) & 1 == 1;
-            let views: Vec<PosePair> = set
-                .iter()
-                .enumerate()
-                .map(|(k, &view)| match half_turn {
-                    Some(half_turn) if turned(k) => turn(&pairs[view], half_turn),
-                    _ => pairs[view],
-                })
-                .collect();
-            solutions.extend(ParkMartin.solve(&views).ok());
+        let set: Vec<PosePair> = draw.distinct(pairs.len(), SET).into_iter().map(|view| pairs[view]).collect();
+        let mut numbered = numbered(&set, turns);
+        if numbered.len() > NUMBERINGS {
+            let unlike = |views: &[PosePair]| -> f64 {
+                (1..views.len())
+                    .flat_map(|i| (0..i).map(move |j| (i, j)))
+                    .map(|(i, j)| unlike_rad(&views[i], &views[j]))
+                    .sum()
+            };
+            numbered.sort_by(|a, b| unlike(a).total_cmp(&unlike(b)));
+            numbered.truncate(NUMBERINGS);
         }
+        solutions.extend(numbered.iter().filter_map(|views| ParkMartin.solve(views).ok()));
     }
     solutions
 }
 
-/// The pair with its target numbered from the other end.
-fn turn(pair: &PosePair, half_turn: &Isometry3<f64>) -> PosePair {
-    let camera_from_target = Pose::from_isometry(pair.camera_from_target.isometry() * half_turn);
-    PosePair { camera_from_target, ..*pair }
+/// A set of views in every numbering of all but the first.
+fn numbered(set: &[PosePair], turns: &Turns) -> Vec<Vec<PosePair>> {
+    let mut all: Vec<Vec<PosePair>> = vec![Vec::new()];
+    for (k, pair) in set.iter().enumerate() {
+        let ways = turns.quarters().take(if k == 0 { 1 } else { usize::MAX });
+        all = ways
+            .flat_map(|quarters| {
+                let pair = turns.pair(pair, quarters);
+                all.iter().map(move |views| views.iter().copied().chain([pair]).collect()).collect::<Vec<_>>()
+            })
+            .collect();
+    }
+    all
 }
 
 #[cfg(test)]
@@ -156,26 +155,34 @@ mod tests {
             pair.camera_from_target = pair.camera_from_target.perturbed(&off);
         }
         let all = ParkMartin.solve(&pairs).expect("solves");
-        let found = consensus(&pairs, &[all], None, |s, view, _| distance(s, &pairs[view])).expect("finds");
+        let found =
+            consensus(&pairs, &[all], &Turns::default(), |s, view, _| distance(s, &pairs[view])).expect("finds");
         let error = |s: &ClosedFormSolution| s.mount_from_camera.distance_to(&t.mount_from_camera).0;
         assert!(error(&found.solution) < 1e-6, "{}", error(&found.solution));
         assert!(error(&all) > 1e-3, "the views were wrong: {}", error(&all));
     }
 
+    /// A board of which the numbering is open by half a turn, and one by a quarter.
     #[test]
-    fn views_numbered_from_the_other_end_are_named() {
-        let t = trial(Mode::EyeToHand, 9, &REALISTIC, camera(), 72);
-        let mut pairs = pairs(&t);
-        let centre = crate::testing::sessions::BOARD.centre();
-        let half_turn = half_turn_about(&centre);
-        for i in [2, 5, 6] {
-            pairs[i] = turn(&pairs[i], &half_turn);
+    fn views_numbered_from_another_corner_are_named() {
+        use crate::targets::{Grid, TargetSpec};
+        let grid = |columns| Grid { columns, rows: 9, square_m: 0.01 };
+        for (target, wrong) in [
+            (TargetSpec::Circles(grid(8)), vec![(2, 2), (5, 2), (6, 2)]),
+            (TargetSpec::Circles(grid(9)), vec![(0, 1), (2, 3), (5, 2), (6, 1), (7, 3)]),
+        ] {
+            let t = trial(Mode::EyeToHand, 9, &REALISTIC, camera(), 72);
+            let mut pairs = pairs(&t);
+            let turns = Turns::of(&target);
+            for (view, quarters) in &wrong {
+                pairs[*view] = turns.pair(&pairs[*view], 4 - quarters);
+            }
+            let misfit =
+                |s: &ClosedFormSolution, view: usize, quarters: usize| distance(s, &turns.pair(&pairs[view], quarters));
+            let found = consensus(&pairs, &[], &turns, misfit).expect("finds");
+            assert_eq!(found.turned, wrong);
+            assert!(found.solution.mount_from_camera.distance_to(&t.mount_from_camera).0 < 1e-6);
+            assert!(found.solution.anchor_from_target.distance_to(&t.anchor_from_target).0 < 1e-6);
         }
-        let misfit = |s: &ClosedFormSolution, view: usize, turned: bool| {
-            if turned { distance(s, &turn(&pairs[view], &half_turn)) } else { distance(s, &pairs[view]) }
-        };
-        let found = consensus(&pairs, &[], Some(&half_turn), misfit).expect("finds");
-        assert_eq!(found.turned, [2, 5, 6]);
-        assert!(found.solution.mount_from_camera.distance_to(&t.mount_from_camera).0 < 1e-6);
     }
 }

@@ -16,6 +16,7 @@ pub mod consensus;
 pub(crate) mod draw;
 pub mod joint;
 pub mod motion;
+pub(crate) mod numbering;
 pub mod one_axis;
 pub mod pose_graph;
 pub(crate) mod scale;

@@ -293,7 +293,7 @@ pub struct ViewRecord {
     /// Corners of it that were left out as outliers, by their index.
     #[serde(default)]
     pub corners_aside: Vec<usize>,
-    /// Whether its target was numbered from the other end than detected.
+    /// Whether its target was numbered from another corner than detected.
     #[serde(default)]
     pub renumbered: bool,
 }

@@ -178,6 +178,6 @@ fn view(view: &ViewResult) -> ViewRecord {
         influence_mm: view.influence_m.map(|m| m * 1e3),
         distance: view.distance.map(|d| d.of_limit).filter(|d| d.is_finite()),
         corners_aside: view.corners_aside.clone(),
-        renumbered: view.renumbered,
+        renumbered: view.quarter_turns != 0,
     }
 }

@@ -102,11 +102,11 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
                 "The intrinsics given do not fit the images: the focal length would be {percent} % ± {sigma} % off, the \
                  centre by {x} ± {x_sigma} px and {y} ± {y_sigma} px.",
                 percent = format!("{percent:+.2}"),
-                 sigma = shown(sigma_percent, 2),
-                 x = format!("{:+.2}", number(2)),
-                 x_sigma = shown(sigma(2), 2),
-                 y = format!("{:+.2}", number(3)),
-                 y_sigma = shown(sigma(3), 2)
+                sigma = shown(sigma_percent, 2),
+                x = format!("{:+.2}", number(2)),
+                x_sigma = shown(sigma(2), 2),
+                y = format!("{:+.2}", number(3)),
+                y_sigma = shown(sigma(3), 2)
             );
             numbers.push(evidence("focal_change", percent, "%"));
             let change = estimate("focal_change", percent, Some(sigma_percent), "%");

@@ -201,6 +201,25 @@ fn gross_words(sight: &SessionViews, code: FindingCode, tried: &Tried) -> Option
                 stated = stated
             )
         }
+        FindingCode::WrongAngleUnit => text!("The angles of the robot poses are in {has} where {stated} were stated.")
+            .with("has", text!("radians"))
+            .with("stated", text!("degrees")),
+        FindingCode::WrongLengthUnit if !is_a_thousand(tried.change.unit) => {
+            let factor = factor_said(tried.change.unit);
+            if factor.contains("25") {
+                text!(
+                    "The stated size of the target is {factor} times the true one, by an inch: inches and millimetres were mixed up \
+                     in it or in the positions of the robot poses.",
+                    factor = factor
+                )
+            } else {
+                text!(
+                    "The stated size of the target is {factor} times the true one, a power of ten: millimetres, centimetres and \
+                     metres were mixed up in it or in the positions of the robot poses.",
+                    factor = factor
+                )
+            }
+        }
         FindingCode::WrongLengthUnit => {
             let (metres, millimetres) = (text!("metres"), text!("millimetres"));
             let (has, stated) = if tried.change.unit < 1.0 { (millimetres, metres) } else { (metres, millimetres) };
@@ -214,6 +233,25 @@ fn gross_words(sight: &SessionViews, code: FindingCode, tried: &Tried) -> Option
         FindingCode::ShiftedPoses => pairing_words(sight, tried.change.pairing)?,
         _ => return None,
     })
+}
+
+fn is_a_thousand(unit: f64) -> bool {
+    [1e-3, 1e3].contains(&unit)
+}
+
+/// A factor between units of length as people write it.
+fn factor_said(unit: f64) -> String {
+    if unit >= 1.0 && unit < 30.0 {
+        format!("{unit}")
+    } else if unit > 30.0 && unit < 40.0 {
+        "1/0.0254".into()
+    } else if unit > 1.0 {
+        format!("{unit:.0}")
+    } else if (unit - 1.0 / 25.4).abs() < 1e-9 {
+        "1/25.4".into()
+    } else {
+        format!("{unit}")
+    }
 }
 
 /// Which rows images and poses were paired by.
@@ -254,6 +292,7 @@ fn gross_advice(sight: &SessionViews, code: FindingCode) -> Option<Text> {
             text!("Check whether the table has base_from_tip or tip_from_base, and whether the camera is on the tip.")
         }
         FindingCode::WrongQuaternionOrder => text!("Check the order of the columns."),
+        FindingCode::WrongAngleUnit => text!("Check the unit of the angles: angle_unit in [robot] of a data set."),
         FindingCode::WrongLengthUnit => text!("Check the unit of the poses and the size of the target."),
         FindingCode::ShiftedPoses => text!("Check how images and poses were paired."),
         _ => return None,

@@ -72,8 +72,9 @@ fn one_grossly_wrong_view_of_ten_does_not_lead_the_fit_astray() {
             };
             let other_end = |t: &mut Trial| {
                 t.views[6].corners.iter_mut().for_each(|c| c.index = 69 - c.index);
-                let turn =
-                    crate::estimate::handeye::consensus::half_turn_about(&crate::testing::sessions::BOARD.centre());
+                let centre = nalgebra::Translation3::from(crate::testing::sessions::BOARD.centre().coords);
+                let half_turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::PI);
+                let turn = centre * half_turn * centre.inverse();
                 let truth = &mut t.true_camera_from_target[6];
                 *truth = Pose::from_isometry(truth.isometry() * turn);
             };

@@ -8,6 +8,8 @@
 //! are listed; the one that puts the camera nearer to what carries it than the target is comes first.
 
 mod cases;
+mod field_of_view;
+mod own_poses;
 mod scale;
 mod trial;
 mod turns;
@@ -123,7 +125,8 @@ pub fn judge(
     if cases.is_empty() {
         return Err(ImportError::NothingLeft("these settings".into()));
     }
-    let judge = Judge { recording, sights, paired: &paired, settings, cancel, read: RefCell::default() };
+    let (read, own) = (RefCell::default(), RefCell::default());
+    let judge = Judge { recording, sights, paired: &paired, settings, cancel, read, own };
     let tried = cases.len();
     untried += turns::keep_alike(&judge, &mut cases, MOST_SOLVED);
     let mut quick: Vec<(f64, usize)> = Vec::with_capacity(tried);
@@ -167,11 +170,15 @@ pub fn judge(
     }
     let mut hypotheses: Vec<Hypothesis> = chosen.iter().flat_map(|i| judge.judged(&cases[*i])).collect();
     if hypotheses.iter().all(|h| h.fit.is_none()) && !cancel.is_cancelled() {
+        if let Some(stood) = cases::did_not_move(recording, &paired, settings) {
+            return Err(stood);
+        }
         return Err(ImportError::NoViews { folder: recording.root.clone(), need: LEAST_POSES });
     }
     sort(recording, &mut hypotheses);
     let mended = judge.mended(&hypotheses);
     hypotheses.extend(mended);
+    judge.contradict_own_poses(&mut hypotheses);
     merge_equal(recording, &mut hypotheses);
     scale::contradict(&judge, &mut hypotheses);
     sort(recording, &mut hypotheses);
