@@ -302,7 +302,7 @@ fn names_and_messages_of_strangers_command_no_terminal() {
         &["doctor", utf8(&folder)],
         &["import", utf8(&folder)],
         &["import", utf8(&folder), "--out", utf8(&out)],
-        &["export", utf8(&none)],
+        &["export", utf8(&none), "--format", "opencv_yaml", "--out", utf8(&out)],
         &["driver", "test", &driver],
         &["track", "--calibration", utf8(&folder), "--connect", evil],
         &[evil],
@@ -314,6 +314,6 @@ fn names_and_messages_of_strangers_command_no_terminal() {
                 said.chars().filter(|letter| letter.is_control() && !"\n\t".contains(*letter)).collect();
             assert!(obeyed.is_empty() && !said.contains('\u{202e}'), "{command:?}: {said:?}");
         }
-        assert!(text(&output.stderr).contains("\\u{1b}"), "{command:?}: {:?}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("\\u{202e}"), "{command:?}: {:?}", text(&output.stderr));
     }
 }
