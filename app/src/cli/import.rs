@@ -152,7 +152,9 @@ fn import(
     cancel: &CancelToken,
 ) -> Result<Done, Refused> {
     let refused = |error: NotUnderstood| match error {
-        NotUnderstood::Import(ImportError::NoPoses { .. } | ImportError::NoViews { .. }) => Failure::failed(error),
+        NotUnderstood::Import(
+            ImportError::NoPoses { .. } | ImportError::NoViews { .. } | ImportError::DidNotMove { .. },
+        ) => Failure::failed(error),
         NotUnderstood::Import(error) => Failure::unusable(error),
         NotUnderstood::Target(_) => Failure::failed(anyhow!("nothing was written: {error}; --target gives it")),
         NotUnderstood::Observe(error) => Failure::failed(error),
@@ -221,11 +223,11 @@ fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Fa
             "{count} hypotheses explain the recording and differ: fix what you know with --set KEY=VALUE, or take one with \
              --take N or --take best"
         )),
-        (_, Verdict::Unexplained) => nothing(
-            "no hypothesis explains the recording: images and poses may not belong together, or the target be another; \
-             --take N takes one all the same"
-                .into(),
-        ),
+        (_, Verdict::Unexplained) => {
+            let why = judgement.hypotheses.first().and_then(|best| best.contradictions.first());
+            let why = why.map_or("images and poses may not belong together, or the target be another", String::as_str);
+            nothing(format!("no hypothesis explains the recording: {why}; --take N takes one all the same"))
+        }
     }
 }
 

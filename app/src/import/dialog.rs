@@ -90,8 +90,10 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
 }
 
 fn of_stream(stream: &Stream) -> Text {
-    let Stream { name, images, size: (width, height), is_depth } = stream;
-    let line = if *is_depth {
+    let Stream { name, images, size: (width, height), is_depth, points } = stream;
+    let line = if points.is_some() {
+        text!("corners of {count} images in {name}, of {width} × {height} px", count = images.len(), name = name)
+    } else if *is_depth {
         text!("{count} depth images {name} of {width} × {height} px", count = images.len(), name = name)
     } else {
         text!("{count} images {name} of {width} × {height} px", count = images.len(), name = name)

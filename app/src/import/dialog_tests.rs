@@ -58,8 +58,13 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         same_as: None,
         stamp_ns: None,
     };
-    let stream =
-        Stream { name: "image#.png".into(), images: (0..4).map(image).collect(), size: (640, 480), is_depth: false };
+    let stream = Stream {
+        name: "image#.png".into(),
+        images: (0..4).map(image).collect(),
+        size: (640, 480),
+        is_depth: false,
+        points: None,
+    };
     let track = Track {
         name: "poses.txt".into(),
         role: TrackRole::Robot,

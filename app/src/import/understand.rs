@@ -7,7 +7,7 @@ use handeye_core::estimate::CameraKnowledge;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::import::{
     self, Clocks, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights, Source,
-    write,
+    Verdict, write,
 };
 use handeye_core::targets::{AprilTag, TargetSpec};
 use handeye_core::wording::English;
@@ -41,6 +41,8 @@ pub struct Looked {
     pub seen: Vec<(String, usize, usize)>,
     /// What else a person should know.
     pub notes: Vec<Text>,
+    /// Why no image shows the target, where two series may be poses of the robot and of the target all the same.
+    unseen: Option<Text>,
     sights: Sights,
     /// By stream, the camera that is taken as known.
     cameras: Vec<Option<FoundCamera>>,
@@ -53,7 +55,15 @@ impl Looked {
     /// # Errors
     /// [`NotUnderstood`].
     pub fn judge(&self, settings: &Settings, cancel: &CancelToken) -> Result<Judgement, NotUnderstood> {
-        let judgement = import::judge(&self.recording, &self.sights, settings, cancel)?;
+        let judged = import::judge(&self.recording, &self.sights, settings, cancel);
+        if let Some(why) = &self.unseen {
+            let is_explained = |judgement: &Judgement| judgement.verdict != Verdict::Unexplained;
+            let is_told = matches!(&judged, Err(ImportError::DidNotMove { .. } | ImportError::BadChoice { .. }));
+            if !is_told && !judged.as_ref().is_ok_and(is_explained) && !cancel.is_cancelled() {
+                return Err(NotUnderstood::Target(why.clone()));
+            }
+        }
+        let judgement = judged?;
         if cancel.is_cancelled() { Err(ObserveError::Cancelled.into()) } else { Ok(judgement) }
     }
 
@@ -93,7 +103,7 @@ pub fn clocks_said(clocks: &Clocks) -> Text {
 pub fn looks(key: &str, recording: &Recording) -> bool {
     // The offset of clocks is estimated for what a person has said of the poses.
     let is_about_clocks = matches!(key, "mode" | "pose" | "poses" | "clock_offset") && !recording.motions.is_empty();
-    is_about_clocks || matches!(key, "images" | "camera" | "target_poses" | "arm")
+    is_about_clocks || matches!(key, "images" | "camera" | "target_poses" | "arm" | "image_size")
 }
 
 /// Finds the target in the images. `given` is a target that a person names; without it the one that files describe is taken.
@@ -111,15 +121,16 @@ pub fn look(
         Some(arm) => Arc::new(import::with_arm(recording, arm)?),
         None => Arc::clone(recording),
     };
-    let mut look = Look { recording: &recording, settings, progress, cancel, notes: Vec::new(), seen: Vec::new() };
+    let mut look =
+        Look { recording: &recording, settings, progress, cancel, notes: Vec::new(), unseen: None, seen: Vec::new() };
     let target = look.target(given)?;
     let (mut sights, cameras) = look.sights(target.as_ref().map(|(target, _)| *target))?;
-    let Look { notes, seen, .. } = look;
+    let Look { notes, unseen, seen, .. } = look;
     let recording = match import::timed(&recording, &mut sights, settings, cancel) {
         Err(_) if cancel.is_cancelled() => return Err(ObserveError::Cancelled.into()),
         timed => timed?.map_or(recording, Arc::new),
     };
-    Ok(Looked { recording, target, seen, notes, sights, cameras })
+    Ok(Looked { recording, target, seen, notes, unseen, sights, cameras })
 }
 
 struct Look<'a> {
@@ -128,6 +139,7 @@ struct Look<'a> {
     progress: Progress<'a>,
     cancel: &'a CancelToken,
     notes: Vec<Text>,
+    unseen: Option<Text>,
     seen: Vec<(String, usize, usize)>,
 }
 
@@ -195,40 +207,86 @@ impl Look<'_> {
         }
         let mut troubles: Vec<Text> = Vec::new();
         for i in wanted {
-            let stream = &recording.streams[i];
-            let paths = recording.image_paths(i);
-            let Some(target) = target else {
-                troubles.push(self.chessboards_in_sight(&stream.name, &paths)?);
-                continue;
-            };
-            let (camera, note) = import::chosen_camera(recording, stream.size, self.settings)?;
-            self.notes.extend(note.map(Text::verbatim));
+            match self.sight(i, target)? {
+                Ok((sight, camera)) => (sights.streams[i], cameras[i]) = (Some(sight), camera),
+                Err(why) => troubles.push(why),
+            }
+        }
+        if sights.streams.iter().any(Option::is_some) {
+            self.notes.extend(troubles);
+        } else {
+            self.without_images(target, troubles)?;
+        }
+        Ok((sights, cameras))
+    }
+
+    /// What a stream shows of the target, with the camera that is taken as known; or why it is not seen.
+    fn sight(
+        &mut self,
+        i: usize,
+        target: Option<TargetSpec>,
+    ) -> Result<Result<(Sight, Option<FoundCamera>), Text>, NotUnderstood> {
+        let stream = &self.recording.streams[i];
+        let paths = self.recording.image_paths(i);
+        let trouble = |why: &dyn std::fmt::Display| text!("{name}: {why}", name = &stream.name, why = why.to_string());
+        let Some(target) = target else {
+            let Some(points) = &stream.points else { return self.chessboards_in_sight(&stream.name, &paths).map(Err) };
+            return Ok(Err(text!(
+                "{name} has {count} corners of an image: give the target that has so many, as COLUMNSxROWSxMM",
+                name = &stream.name,
+                count = points.iter().flatten().next().map_or(0, Vec::len)
+            )));
+        };
+        let size = match &stream.points {
+            Some(_) => import::size_of_points(stream, self.settings.image_size),
+            None => Ok(stream.size),
+        };
+        let size = match size {
+            Ok(size) => size,
+            Err(why) => return Ok(Err(trouble(&why))),
+        };
+        let (camera, note) = import::chosen_camera(self.recording, size, self.settings)?;
+        self.notes.extend(note.map(Text::verbatim));
+        let known = camera.as_ref().map_or(CameraKnowledge::NOTHING, |c| CameraKnowledge::Fixed(c.intrinsics));
+        let sight = if let Some(points) = &stream.points {
+            self.seen.push((stream.name.clone(), points.iter().flatten().count(), points.len()));
+            Sight::of_points(target, stream, Some(size), known)
+        } else {
             let corners = match observe::observe_images(&paths, &target, self.progress, self.cancel) {
                 Err(ObserveError::Cancelled) => return Err(ObserveError::Cancelled.into()),
-                Err(error) => {
-                    troubles.push(text!("{name}: {why}", name = &stream.name, why = error));
-                    continue;
-                }
+                Err(error) => return Ok(Err(trouble(&error))),
                 Ok(corners) => corners,
             };
             self.seen.push((stream.name.clone(), corners.iter().flatten().count(), corners.len()));
-            let known = camera.as_ref().map_or(CameraKnowledge::NOTHING, |c| CameraKnowledge::Fixed(c.intrinsics));
-            match Sight::of_corners(target, stream.size, known, &corners) {
-                Ok(sight) => (sights.streams[i], cameras[i]) = (Some(sight), camera),
-                Err(why) => troubles.push(text!("{name}: {why}", name = &stream.name, why = why)),
-            }
+            Sight::of_corners(target, stream.size, known, &corners)
+        };
+        Ok(sight.map(|sight| (sight, camera)).map_err(|why| trouble(&why)))
+    }
+
+    /// Where no image shows the target: recorded poses of it need none.
+    fn without_images(&mut self, target: Option<TargetSpec>, troubles: Vec<Text>) -> Result<(), NotUnderstood> {
+        let recording = self.recording;
+        let instead = text!("the recorded poses of the target are used, and not the images");
+        if recording.tracks.iter().any(|track| track.role == Role::Target) {
+            // What the target is they do not say, and need not.
+            self.notes.extend(if target.is_some() { troubles } else { vec![instead] });
+            return Ok(());
         }
-        let has_target_poses = recording.tracks.iter().any(|track| track.role == Role::Target);
-        if sights.streams.iter().all(Option::is_none) && !has_target_poses {
-            let troubles = Text::list(troubles);
-            return Err(NotUnderstood::Target(if target.is_some() {
-                text!("the target was not found: {troubles}", troubles = troubles)
-            } else {
-                text!("the files do not say what was looked at: {troubles}", troubles = troubles)
-            }));
+        let troubles = Text::list(troubles);
+        let why = if target.is_some() {
+            text!("the target was not found: {troubles}", troubles = troubles)
+        } else {
+            text!("the files do not say what was looked at: {troubles}", troubles = troubles)
+        };
+        // Whose two series are that say nothing of it, the data tell.
+        let may_be = recording.tracks.iter().filter(|track| track.reading_of.is_none());
+        let has_pair = may_be.clone().count() >= 2 && may_be.clone().any(|track| track.role != Role::Robot);
+        if !has_pair && recording.still.is_empty() {
+            return Err(NotUnderstood::Target(why));
         }
-        self.notes.extend(troubles);
-        Ok((sights, cameras))
+        self.notes.push(instead);
+        self.unseen = Some(why);
+        Ok(())
     }
 
     /// What chessboards the images of a stream show.

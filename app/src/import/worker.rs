@@ -148,7 +148,8 @@ fn previews(recording: &Recording) -> Vec<Vec<Arc<RgbImage>>> {
     let small =
         |path: &PathBuf| image_file::load_rgb(path).map_or_else(|_| RgbImage::new(1, 1), |image| thumbnail(&image));
     let of_stream = |stream: usize| {
-        let paths = recording.image_paths(stream);
+        let has_images = recording.streams[stream].points.is_none();
+        let paths = if has_images { recording.image_paths(stream) } else { Vec::new() };
         paths.iter().take(PREVIEWS).map(|path| Arc::new(small(path))).collect()
     };
     (0..recording.streams.len()).map(of_stream).collect()
@@ -161,6 +162,14 @@ fn convert(known: &Found, hypothesis: usize, is_taken: bool, number: u64, outlet
     if matches!(chosen.source, Source::Track(_)) {
         return Err(text!(
             "this recording has poses of the target and no images, which a session needs: “handeye import” and “handeye \
+             calibrate” solve it"
+        ));
+    }
+    if let Source::Stream(stream) = chosen.source
+        && recording.streams.get(stream).is_some_and(|stream| stream.points.is_some())
+    {
+        return Err(text!(
+            "this recording has corners in the place of images, which a session needs: “handeye import” and “handeye \
              calibrate” solve it"
         ));
     }

@@ -131,7 +131,9 @@ impl Chain {
                 direction: Some(Known::by(by("the tip in the base"), Direction::Forward)),
                 ..Stated::default()
             };
-            if let Some(mut track) = tree::track(name, "robot", stated, samples.collect()) {
+            if let Some(mut track) =
+                tree::track(name, "robot", stated, samples.collect()).filter(|track| !track.is_still())
+            {
                 track.role = Role::Robot;
                 tracks.push(track);
             }

@@ -31,7 +31,7 @@ pub enum ImportError {
     AlreadyADataset(PathBuf),
     /// There is nothing that could be robot poses.
     #[error(
-        "{}: no series of at least {need} poses was found (tables, JSON, YAML, npz and bags of ROS are read): {seen}",
+        "{}: no series of at least {need} poses was found (tables, JSON, YAML, XML, npz and bags of ROS are read): {seen}",
         folder.display()
     )]
     NoPoses {
@@ -41,6 +41,23 @@ pub enum ImportError {
         need: usize,
         /// What was found instead.
         seen: String,
+    },
+    /// The robot was at one place all the time.
+    #[error(
+        "{}: the robot did not move: the {count} poses of {series} are {}; a calibration needs poses that are turned by 30° or more \
+         about two different axes",
+        folder.display(),
+        alike(*spread_mm_deg)
+    )]
+    DidNotMove {
+        /// The folder.
+        folder: PathBuf,
+        /// The robot's poses.
+        series: String,
+        /// How many they are.
+        count: usize,
+        /// How far they are apart at the most, millimetres and degrees; `None` where their numbers are the same.
+        spread_mm_deg: Option<(f64, f64)>,
     },
     /// No way to put the files together has views to solve with.
     #[error(
@@ -96,4 +113,8 @@ pub enum ImportError {
         /// What the system says.
         why: String,
     },
+}
+
+fn alike(spread_mm_deg: Option<(f64, f64)>) -> String {
+    spread_mm_deg.map_or_else(|| "all the same".into(), |(mm, deg)| format!("the same within {mm:.2} mm and {deg:.2}°"))
 }

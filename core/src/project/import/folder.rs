@@ -77,6 +77,33 @@ fn walk(root: &Path, below: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Re
     Ok(())
 }
 
+/// The images in folders below the one that is named, in which poses say that they are; links lead nowhere.
+pub(super) fn images_below<'a>(root: &Path, names: impl Iterator<Item = &'a str>) -> Vec<PathBuf> {
+    let mut folders: std::collections::BTreeSet<PathBuf> = std::collections::BTreeSet::new();
+    for name in names {
+        let path = PathBuf::from(name.trim().replace('\\', "/"));
+        let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) else { continue };
+        let is_below = folder.components().all(|part| matches!(part, std::path::Component::Normal(_)));
+        if is_below && folder.components().count() <= MAX_DEPTH {
+            folders.insert(folder.to_path_buf());
+        }
+    }
+    let is_folder = |folder: &PathBuf| {
+        folder
+            .ancestors()
+            .filter(|part| !part.as_os_str().is_empty())
+            .all(|part| fs::symlink_metadata(root.join(part)).is_ok_and(|found| found.is_dir()))
+    };
+    let mut files = Vec::new();
+    for folder in folders.iter().filter(|folder| is_folder(folder)) {
+        // What cannot be listed has no images.
+        let _left_out = walk(root, folder, 0, &mut files).is_err();
+    }
+    files.retain(|file| is_image(file));
+    files.sort_by(|a, b| natural_order::compare(&a.to_string_lossy(), &b.to_string_lossy()));
+    files
+}
+
 pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> ImportError {
     ImportError::Unreadable { file: path.to_path_buf(), why: one_line(error) }
 }
@@ -205,7 +232,7 @@ fn take(root: &Path, members: Vec<(PathBuf, Option<u64>)>, streams: &mut Vec<Str
         if sizes > 1 {
             name = format!("{name} ({}×{})", size.0, size.1);
         }
-        streams.push(Stream { name, images, size, is_depth });
+        streams.push(Stream { name, images, size, is_depth, points: None });
     }
 }
 

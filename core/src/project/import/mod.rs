@@ -35,6 +35,10 @@ mod judge_tests;
 #[cfg(test)]
 mod layout_tests;
 #[cfg(test)]
+mod own_poses_tests;
+#[cfg(test)]
+mod pairs_tests;
+#[cfg(test)]
 mod tests;
 
 pub use camera::chosen as chosen_camera;
@@ -50,6 +54,6 @@ pub use recording::{
     Sample, Stated, Stream, Track,
 };
 pub use settings::{KEYS, Settings};
-pub use sight::Sight;
+pub use sight::{Sight, size_of_points};
 pub use timing::timed;
 pub use write::{Plan, plan};

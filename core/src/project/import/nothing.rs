@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::folder;
-use super::formats::{blocks, npz, table, tree};
+use super::formats::{blocks, npz, table, tree, xml};
 use super::value::{self, Value};
 
 /// Files of text that are told of.
@@ -64,6 +64,16 @@ fn reason(file: &Path) -> Option<(Likely, String)> {
     Some(match folder::ending(file).as_str() {
         "json" | "jsonl" | "samples" => of_document(value::json(&text()?)),
         "yaml" | "yml" => of_document(value::yaml(&text()?).map(Value::List)),
+        "xml" => {
+            let text = text()?;
+            match value::opencv_xml(&text).or_else(|| xml::document(&text)) {
+                Some(value) => document(&value),
+                None => (
+                    Likely::Neither,
+                    "nothing that is read as records: elements of one name with six numbers or more".to_owned(),
+                ),
+            }
+        }
         "csv" | "txt" | "tsv" | "dat" | "log" => of_text(&text()?),
         // Programs and licences have no ending either.
         "" => Some(of_text(&text()?)).filter(|(likely, _)| *likely != Likely::Neither)?,

@@ -7,7 +7,7 @@ use super::folder;
 use super::formats::moveit;
 use super::nothing;
 use super::reader::Reader;
-use super::recording::{FoundTarget, Recording};
+use super::recording::{FoundTarget, Recording, Track};
 use crate::project::files::own_folder::{DESCRIPTION, is_session};
 
 /// Looks at a folder, or at a file and what lies beside it.
@@ -43,12 +43,27 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
     }
     reader.companions(&beside);
     reader.bags(&bags);
+    if named.is_some() {
+        reader.named_images();
+    }
     let mut recording = reader.recording;
+    (recording.still, recording.tracks) = recording.tracks.into_iter().partition(Track::is_still);
     if moveit::know(&mut recording.tracks) {
         recording.beliefs.push("the poses are samples of MoveIt calibration, by their names".into());
     }
     if recording.tracks.is_empty() && recording.joints.is_empty() && recording.motions.is_empty() {
         recording.nothing = nothing::reasons(&root, &files);
+    }
+    for stream in recording.streams.iter().filter(|stream| stream.points.is_some()) {
+        let (width, height) = stream.size;
+        let size = if stream.size == (0, 0) {
+            "no file says of which size".into()
+        } else {
+            format!("of {width}×{height} px")
+        };
+        let points = stream.points.iter().flatten().flatten();
+        let (views, most) = (points.clone().count(), points.map(Vec::len).max().unwrap_or(0));
+        recording.beliefs.push(format!("up to {most} corners of {views} images ({size}) in {}", stream.name));
     }
     for track in &recording.tracks {
         let joints = track.samples.iter().filter(|s| !s.joints.is_empty()).count();
@@ -59,6 +74,9 @@ pub fn open(path: &Path) -> Result<Recording, ImportError> {
             super::Numbers::Matrix(_) => "matrices",
         };
         recording.beliefs.push(format!("{} poses in {}: {kind}{with}", track.samples.len(), track.name));
+    }
+    for track in &recording.still {
+        recording.beliefs.push(format!("{} poses in {} are all the same", track.samples.len(), track.name));
     }
     for series in &recording.joints {
         let names = if series.joints.is_empty() { String::new() } else { format!(" ({})", series.joints.join(", ")) };

@@ -23,6 +23,8 @@ pub struct Recording {
     pub streams: Vec<Stream>,
     /// Series of poses.
     pub tracks: Vec<Track>,
+    /// Series of which all poses are the same: settings, or a robot that did not move.
+    pub still: Vec<Track>,
     /// Joint values, of which the chain of the arm makes poses.
     pub joints: Vec<JointSeries>,
     /// Rows of numbers without names. They are joint values only for whoever names the arm.
@@ -67,6 +69,9 @@ pub struct Stream {
     pub size: (u32, u32),
     /// One channel of 16 bits: depth, where there are other images.
     pub is_depth: bool,
+    /// In the place of images, points of the target that another program has found in each, in the order of the file; the size is
+    /// (0, 0) where no file says it. `images` are then the files or entries that they are from.
+    pub points: Option<Vec<Option<Vec<[f64; 2]>>>>,
 }
 
 /// An image.
@@ -113,6 +118,13 @@ pub struct Track {
     pub reading_of: Option<String>,
     /// In the order of the file, or of the files' numbers.
     pub samples: Vec<Sample>,
+}
+
+impl Track {
+    /// Whether all its poses are the same numbers: a setting, or a robot that did not move.
+    pub fn is_still(&self) -> bool {
+        self.samples.windows(2).all(|pair| pair[0].numbers == pair[1].numbers)
+    }
 }
 
 /// One pose as it was written.

@@ -21,6 +21,7 @@ pub const KEYS: &str = "\
   target_length_unit=m|mm|cm            of the target's poses
   target_rotation=NAME                  of the target's poses
   camera=FILE|none                      which camera is taken as known
+  image_size=WIDTHxHEIGHT               of the images that recorded corners are from, in pixels, where no file says it
   joint_unit=rad|deg                    takes over the joint values that stand with the poses
   clock_offset=SECONDS                  what is added to stamps of images to have them by the robot's clock, roughly, where the
                                         clocks of a bag are apart by more than 2 s
@@ -57,6 +58,8 @@ pub struct Settings {
     pub target_rotation: Option<RotationForm>,
     /// By its file; `none` for no camera.
     pub camera: Option<String>,
+    /// Width and height in pixels of the images that recorded corners are from.
+    pub image_size: Option<(u32, u32)>,
     /// Of the joint values, which are taken over when it is given.
     pub joint_unit: Option<AngleUnit>,
     /// About what is added to stamps of images to have them by the robot's clock, seconds.
@@ -119,6 +122,11 @@ impl Settings {
             "poses" => self.poses = Some(text()?),
             "target_poses" => self.target_poses = Some(text()?),
             "camera" => self.camera = Some(text()?),
+            "image_size" => {
+                let side = |text: &str| text.trim().parse().ok().filter(|px: &u32| (1..100_000).contains(px));
+                let size = value.split_once(['x', 'X', '×']).and_then(|(width, height)| side(width).zip(side(height)));
+                self.image_size = Some(size.ok_or_else(|| bad("width and height in pixels, such as 640x480"))?);
+            }
             "clock_offset" => {
                 let seconds = value.parse().ok().filter(|seconds: &f64| seconds.is_finite());
                 self.clock_offset_s = Some(seconds.ok_or_else(|| bad("seconds, such as -12.5"))?);
@@ -129,7 +137,7 @@ impl Settings {
                     key: "a key of --set".into(),
                     value: key.to_owned(),
                     choices: "mode, length_unit, angle_unit, rotation, pose, pairing, images, poses, target_poses, \
-                              target_pose, target_length_unit, target_rotation, camera, joint_unit, clock_offset or arm"
+                              target_pose, target_length_unit, target_rotation, camera, image_size, joint_unit, clock_offset or arm"
                         .into(),
                 });
             }

@@ -89,8 +89,7 @@ pub fn timed(
         }
         let kept = |index: &usize| stream.images[*index].clone();
         out.streams[i].images = chosen.iter().map(kept).collect();
-        let sight = Sight { seen: chosen.iter().map(|index| sight.seen[*index]).collect(), ..sight.clone() };
-        sights.streams[i] = Some(sight);
+        sights.streams[i] = Some(sight.of_images(&chosen));
     }
     Ok(is_timed.then_some(out))
 }
@@ -120,8 +119,7 @@ fn stood(recording: &Recording, out: &mut Recording, sights: &mut Sights, i: usi
     ));
     out.streams[i].images =
         kept.iter().map(|image| ImageFile { stamp_ns: None, ..stream.images[*image].clone() }).collect();
-    let seen = kept.iter().map(|image| sight.seen[*image]).collect();
-    sights.streams[i] = Some(Sight { seen, ..sight.clone() });
+    sights.streams[i] = Some(sight.of_images(&kept));
     out.tracks.extend(tracks);
     true
 }
@@ -242,7 +240,7 @@ fn track(motion: &Motion, stream: &Stream, offset: &ClockOffset, chosen: &[usize
         ..Stated::default()
     };
     let samples = chosen.iter().filter_map(sample).collect();
-    let mut track = tree::track(motion.name.clone(), "robot", stated, samples)?;
+    let mut track = tree::track(motion.name.clone(), "robot", stated, samples).filter(|track| !track.is_still())?;
     track.role = motion.role;
     Some(track)
 }

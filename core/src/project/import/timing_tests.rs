@@ -43,7 +43,7 @@ fn recorded(mode: Mode, seconds: f64, moves: impl Fn(f64) -> Isometry3<f64>) -> 
         .collect();
     let target = TargetSpec::Chessboard(Grid { columns: 9, rows: 6, square_m: 0.02 });
     let sights = Sights { streams: vec![Some(Sight::of_poses(Some(&target), seen))], target: Some(target) };
-    let stream = Stream { name: "/camera".into(), images, size: (640, 480), is_depth: false };
+    let stream = Stream { name: "/camera".into(), images, size: (640, 480), is_depth: false, points: None };
     (Recording { streams: vec![stream], motions: vec![motion], ..Recording::default() }, sights)
 }
 

@@ -12,16 +12,20 @@ use super::hypothesis::{Hypothesis, Source};
 use super::judge::{Judgement, TIMES};
 use super::recording::{FoundCamera, Recording, Track};
 use super::settings::Settings;
+use super::sight::{recorded_corners, size_of_points};
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::dataset::CameraInput;
 use crate::project::dataset::write::{Joints, description, pose_table, pose_table_with_joints};
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
 use crate::project::files::own_folder::{self, DESCRIPTION};
+use crate::targets::observation::Corner;
 use crate::targets::{AprilTag, Dictionary, TargetSpec};
 
 /// Name of the table of the target's poses.
 const TARGET_POSES: &str = "target_poses.csv";
+/// Name of the table of recorded corners.
+const CORNERS: &str = "corners.csv";
 /// Folder of the images.
 const IMAGES: &str = "images";
 
@@ -34,6 +38,8 @@ pub struct Plan {
     pub poses: String,
     /// The text of `target_poses.csv`, where there are no images.
     pub target_poses: Option<String>,
+    /// The text of `corners.csv`, where recorded corners stand for images.
+    pub corners: Option<String>,
     /// Images to copy, and their names in the data set.
     pub images: Vec<(PathBuf, String)>,
     /// Views that are written.
@@ -68,6 +74,8 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
     let mut images = Vec::new();
     let mut rows: Vec<(String, Pose<Base, Tip>, Vec<f64>)> = Vec::new();
     let mut target_rows = Vec::new();
+    let recorded = RecordedCorners::of(h, known);
+    let mut corner_rows = recorded.as_ref().map(|_| String::from("image,column,row,u,v\n"));
     let joint_unit = known.settings.joint_unit.map_or(1.0, AngleUnit::radians);
     for (index, (sample, image)) in track.samples.iter().zip(&h.pairing.image_of).enumerate() {
         let Some(image) = *image else {
@@ -91,7 +99,14 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
         let name = match h.source {
             Source::Stream(i) => {
                 let path = &recording.streams[i].images[image].path;
-                if let Some(linked) = names.linked(path) {
+                if let (Some(recorded), Some(text)) = (&recorded, &mut corner_rows) {
+                    let name = format!("view_{:04}", rows.len() + 1);
+                    if !recorded.write(image, &name, text) {
+                        left_out.push(format!("{}: it has no corners", image_name(recording, h.source, image)));
+                        continue;
+                    }
+                    name
+                } else if let Some(linked) = names.linked(path) {
                     linked
                 } else {
                     let name = names.of(path, images.len());
@@ -151,13 +166,50 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
         model: camera.intrinsics.distortion,
     });
     let body = description(h.mode, &target, camera.as_ref(), with_joints.then_some(Joints::Count(joints)));
-    if target_poses.is_some() {
+    if let Some(recorded) = &recorded {
+        let key = format!("corners = \"{CORNERS}\"\n\n[robot]");
+        text.push_str(&body.replacen("\n[robot]", &key, 1));
+        if camera.is_none() {
+            let (width, height) = recorded.size;
+            let _ok = write!(text, "\n[camera]\nfixed = false\nwidth = {width}\nheight = {height}\n").is_ok();
+        }
+    } else if target_poses.is_some() {
         let key = format!("poses = \"{TARGET_POSES}\"\npose = \"camera_from_target\"\n\n[robot]");
         text.push_str(&body.replacen("\n[robot]", &key, 1));
     } else {
         text.push_str(&body);
     }
-    Plan { description: text, poses, target_poses, images, views: rows.len(), left_out }
+    Plan { description: text, poses, target_poses, corners: corner_rows, images, views: rows.len(), left_out }
+}
+
+/// Corners that stand for images, and the size of those.
+struct RecordedCorners {
+    views: Vec<Option<Vec<Corner>>>,
+    columns: usize,
+    size: (u32, u32),
+}
+
+impl RecordedCorners {
+    fn of(h: &Hypothesis, known: &Context<'_>) -> Option<Self> {
+        let Source::Stream(i) = h.source else { return None };
+        let stream = known.recording.streams.get(i).filter(|stream| stream.points.is_some())?;
+        let (target, _) = known.target.as_ref()?;
+        // Whoever has this hypothesis has looked at them.
+        let views = recorded_corners(stream, target).ok()?;
+        let size = size_of_points(stream, known.settings.image_size).ok()?;
+        Some(Self { views, columns: target.grid().columns, size })
+    }
+
+    /// Writes the rows of a view; whether it has some.
+    fn write(&self, view: usize, name: &str, text: &mut String) -> bool {
+        let Some(Some(corners)) = self.views.get(view) else { return false };
+        for Corner { index, px, .. } in corners {
+            let (column, row) = (index % self.columns, index / self.columns);
+            // Writing to a string cannot fail.
+            let _ok = writeln!(text, "{name},{column},{row},{:?},{:?}", px.x, px.y).is_ok();
+        }
+        true
+    }
 }
 
 /// Stands for a target of which only the poses are known.
@@ -365,6 +417,9 @@ pub fn write(plan: &Plan, out: &Path, mut progress: impl FnMut(usize, usize)) ->
     put(crate::project::dataset::write::POSE_TABLE, plan.poses.as_bytes())?;
     if let Some(target_poses) = &plan.target_poses {
         put(TARGET_POSES, target_poses.as_bytes())?;
+    }
+    if let Some(corners) = &plan.corners {
+        put(CORNERS, corners.as_bytes())?;
     }
     put(DESCRIPTION, plan.description.as_bytes())
 }

@@ -2,6 +2,7 @@
 
 pub(super) mod blocks;
 pub(super) mod board_words;
+pub(super) mod corners;
 pub(super) mod easy_handeye;
 pub(super) mod industrial_calibration;
 pub(super) mod intrinsics;
@@ -15,5 +16,7 @@ pub(super) mod program;
 pub(super) mod rosbag;
 pub(super) mod single;
 pub(super) mod table;
+pub(super) mod text_camera;
 pub(super) mod tree;
 pub(super) mod visp;
+pub(super) mod xml;

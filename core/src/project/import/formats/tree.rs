@@ -57,22 +57,17 @@ fn walk(value: &Value, path: &str, fields: &mut Fields, depth: usize) {
         return;
     }
     match value {
-        Value::Map(entries) => {
-            for (name, numbers, stated) in named::poses(value) {
-                fields.add(joined(path, &name), numbers, stated);
-            }
-            for (key, inner) in entries {
-                match inner {
-                    Value::Text(text) if fields.image.is_none() && is_image_name(text) => {
-                        fields.image = Some(text.clone());
-                    }
-                    Value::Number(_) if fields.number.is_none() && is_counting(key) => fields.number = inner.whole(),
-                    // Parts of a pose that was found are no poses of their own.
-                    Value::Map(_) | Value::List(_) => walk(inner, &joined(path, key), fields, depth + 1),
-                    _ => {}
-                }
+        Value::Map(entries) if entries.iter().any(|(key, inner)| inner.number().is_some() && ends_in_number(key)) => {
+            let (mut folded, rest) = folded(entries);
+            let is_folded = !folded.is_empty();
+            folded.extend(rest.into_iter().cloned());
+            if is_folded {
+                walk(&Value::Map(folded), path, fields, depth);
+            } else {
+                walk_map(entries, value, path, fields, depth);
             }
         }
+        Value::Map(entries) => walk_map(entries, value, path, fields, depth),
         Value::List(items) => {
             for (i, item) in items.iter().take(MOST_LOOKED_INTO).enumerate() {
                 walk(item, &joined(path, &format!("[{i}]")), fields, depth + 1);
@@ -80,6 +75,50 @@ fn walk(value: &Value, path: &str, fields: &mut Fields, depth: usize) {
         }
         _ => {}
     }
+}
+
+fn walk_map(entries: &[(String, Value)], value: &Value, path: &str, fields: &mut Fields, depth: usize) {
+    for (name, numbers, stated) in named::poses(value) {
+        fields.add(joined(path, &name), numbers, stated);
+    }
+    for (key, inner) in entries {
+        match inner {
+            Value::Text(text) if fields.image.is_none() && is_image_name(text) => {
+                fields.image = Some(text.trim().to_owned());
+            }
+            Value::Number(_) if fields.number.is_none() && is_counting(key) => fields.number = inner.whole(),
+            // Parts of a pose that was found are no poses of their own.
+            Value::Map(_) | Value::List(_) => walk(inner, &joined(path, key), fields, depth + 1),
+            _ => {}
+        }
+    }
+}
+
+fn ends_in_number(key: &str) -> bool {
+    key.ends_with(|c: char| c.is_ascii_digit())
+}
+
+/// Numbers in fields that count, `pose1` to `pose6`, as the lists that they are; and the other fields.
+fn folded(entries: &[(String, Value)]) -> (Vec<(String, Value)>, Vec<&(String, Value)>) {
+    let mut by_prefix: BTreeMap<String, Vec<(u64, f64)>> = BTreeMap::new();
+    for (key, inner) in entries {
+        if let (Some((prefix, count)), Some(number)) = (counting_key(key), inner.number()) {
+            by_prefix.entry(prefix).or_default().push((count, number));
+        }
+    }
+    by_prefix.retain(|prefix, members| {
+        members.sort_by_key(|(count, _)| *count);
+        let are_next = members.windows(2).all(|pair| pair[0].0 + 1 == pair[1].0);
+        !prefix.is_empty() && are_next && matches!(members.len(), 3 | 4 | 6 | 7 | 9 | 12 | 16)
+    });
+    let is_folded = |key: &str| counting_key(key).is_some_and(|(prefix, _)| by_prefix.contains_key(&prefix));
+    let rest = entries.iter().filter(|(key, inner)| inner.number().is_none() || !is_folded(key)).collect();
+    let list = |(prefix, members): (&String, &Vec<(u64, f64)>)| {
+        // What is called so is an axis of the arm.
+        let name = if matches!(&*prefix.to_lowercase(), "j" | "a" | "axis") { "joint" } else { prefix.as_str() };
+        (name.to_owned(), Value::List(members.iter().map(|(_, number)| Value::Number(*number)).collect()))
+    };
+    (by_prefix.iter().map(list).collect(), rest)
 }
 
 fn joined(path: &str, key: &str) -> String {
@@ -156,6 +195,7 @@ pub(in crate::project::import) fn series(value: &Value, file: &str) -> Vec<Track
     let mut parts = Vec::new();
     look(value, "", file, &mut tracks, &mut parts, 0);
     tracks.extend(parts::series(&parts, file));
+    tracks.sort_by_key(Track::is_still);
     tracks.truncate(MOST_SERIES);
     call_after_files(&mut tracks, file, role_of_document(file));
     tracks
@@ -171,7 +211,7 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
         Value::List(items) if value.numbers(16).is_none() && items.len() >= LEAST_POSES => {
             let named = items.iter().enumerate().map(|(i, item)| (format!("{file}, entry {}", i + 1), None, item));
             let found = of_elements(path, file, named.collect());
-            if found.is_empty() {
+            if found.iter().all(Track::is_still) {
                 parts.extend(Part::of(path, items));
                 for (i, item) in items.iter().take(MOST_LOOKED_INTO).enumerate() {
                     look(item, &joined(path, &format!("[{i}]")), file, tracks, parts, depth + 1);
@@ -265,15 +305,7 @@ pub(in crate::project::import) fn track(
 ) -> Option<Track> {
     let kind = std::mem::discriminant(&samples.first()?.numbers);
     samples.retain(|sample| std::mem::discriminant(&sample.numbers) == kind);
-    // A rigid transform that never changes is a setting.
-    let moves = samples.iter().any(|sample| sample.numbers != samples[0].numbers);
-    (samples.len() >= LEAST_POSES && moves).then(|| Track {
-        role: by_path(path),
-        name,
-        stated,
-        reading_of: None,
-        samples,
-    })
+    (samples.len() >= LEAST_POSES).then(|| Track { role: by_path(path), name, stated, reading_of: None, samples })
 }
 
 /// What poses of this name are of.
@@ -340,7 +372,7 @@ pub(in crate::project::import) fn role_of_files(name: &str) -> Role {
 /// Gives the only series of a document or of files, or the one that is all of them, the role that their name says, where its
 /// own path says none. Of several series some are of another thing than the file is called after.
 pub(in crate::project::import) fn call_after_files(tracks: &mut [Track], files: &str, of_files: Role) {
-    let is_alone = tracks.len() == 1;
+    let is_alone = tracks.iter().filter(|track| !track.is_still()).count() <= 1;
     for track in tracks.iter_mut().filter(|_| of_files != Role::Unknown) {
         let path = track.name.strip_prefix(files).unwrap_or_default();
         if path.is_empty() || (is_alone && role(path) == Role::Unknown) {

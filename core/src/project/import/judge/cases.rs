@@ -1,7 +1,12 @@
 //! What is tried: every series with every source, in every pairing, under every convention that is left open.
 
+use std::collections::BTreeSet;
+
+use nalgebra::Isometry3;
+
 use super::Sights;
 use crate::estimate::handeye::Mode;
+use crate::estimate::handeye::motion::NO_ROTATION_RAD;
 use crate::geometry::statistics::median;
 use crate::project::import::conventions::{
     AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm, angles_for, lengths_for,
@@ -79,7 +84,14 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
     let mut out = Vec::new();
     let mut rules = Vec::new();
     let mut pair = |source: Source, robot: usize, images: &[ImageFile]| {
-        for pairing in pairings(&recording.tracks[robot].samples, images, LEAST_POSES) {
+        let samples = &recording.tracks[robot].samples;
+        let is_beside = |target: &Track| {
+            target.samples.len() == samples.len() && target.samples.iter().zip(samples).all(|(a, b)| a.place == b.place)
+        };
+        let of_rows = matches!(source, Source::Track(i) if is_beside(&recording.tracks[i]));
+        let is_in_step = |pairing: &Pairing| pairing.image_of.iter().enumerate().all(|(i, image)| *image == Some(i));
+        // Two poses of one row are of one moment.
+        for pairing in pairings(samples, images, LEAST_POSES).into_iter().filter(|it| !of_rows || is_in_step(it)) {
             rules.push(pairing.rule.clone());
             // What is found by its content is made after the others.
             if settings.pairing.as_deref().is_none_or(|rule| rule == pairing.rule || rule == "aligned") {
@@ -112,6 +124,14 @@ pub(super) fn sources(recording: &Recording, sights: &Sights, settings: &Setting
         }
     }
     if out.is_empty() {
+        if let Some(still) = recording.still.iter().find(|track| track.role != Role::Target) {
+            return Err(ImportError::DidNotMove {
+                folder: recording.root.clone(),
+                series: still.name.clone(),
+                count: still.samples.len(),
+                spread_mm_deg: None,
+            });
+        }
         if let Some(rule) = settings.pairing.as_ref().filter(|rule| !rules.contains(rule) && !rules.is_empty()) {
             let choices = rules.join(", ");
             return Err(ImportError::BadChoice { key: "pairing".into(), value: rule.clone(), choices });
@@ -207,6 +227,33 @@ fn readings(
         }
     }
     out
+}
+
+/// That the robot stood all the time, by one of the meanings that its numbers may have.
+pub(super) fn did_not_move(recording: &Recording, paired: &[Paired], settings: &Settings) -> Option<ImportError> {
+    // As far apart as two reports of an arm at rest at the most.
+    const AT_REST_M: f64 = 1e-3;
+    let spread = |track: &Track, reading: &Reading| {
+        let poses: Vec<Isometry3<f64>> = track.samples.iter().filter_map(|s| reading.transform(&s.numbers)).collect();
+        let first = poses.first()?;
+        let apart = |pose: &Isometry3<f64>| {
+            ((pose.translation.vector - first.translation.vector).norm(), pose.rotation.angle_to(&first.rotation))
+        };
+        Some(poses.iter().map(apart).fold((0.0f64, 0.0f64), |all, one| (all.0.max(one.0), all.1.max(one.1))))
+    };
+    let robots: BTreeSet<usize> = paired.iter().map(|pair| pair.robot).collect();
+    robots.into_iter().find_map(|robot| {
+        let track = &recording.tracks[robot];
+        let readings = readings(track, settings.length, settings.angle, settings.rotation);
+        let mut spreads = readings.iter().filter_map(|reading| spread(track, reading));
+        let (metres, radians) = spreads.find(|(m, rad)| *m < AT_REST_M && *rad < NO_ROTATION_RAD)?;
+        Some(ImportError::DidNotMove {
+            folder: recording.root.clone(),
+            series: track.name.clone(),
+            count: track.samples.len(),
+            spread_mm_deg: Some((metres * 1e3, radians.to_degrees())),
+        })
+    })
 }
 
 pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Settings) -> Vec<Case> {

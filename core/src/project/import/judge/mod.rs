@@ -8,6 +8,8 @@
 //! are listed; the one that puts the camera nearer to what carries it than the target is comes first.
 
 mod cases;
+mod field_of_view;
+mod own_poses;
 mod scale;
 mod trial;
 mod turns;
@@ -99,7 +101,8 @@ pub fn judge(
     if cases.is_empty() {
         return Err(ImportError::NothingLeft("these settings".into()));
     }
-    let judge = Judge { recording, sights, paired: &paired, settings, read: RefCell::default() };
+    let judge =
+        Judge { recording, sights, paired: &paired, settings, read: RefCell::default(), own: RefCell::default() };
     let tried = cases.len();
     turns::keep_alike(&judge, &mut cases);
     let mut quick: Vec<(f64, usize)> = Vec::with_capacity(tried);
@@ -131,11 +134,15 @@ pub fn judge(
     }
     let mut hypotheses: Vec<Hypothesis> = chosen.iter().flat_map(|i| judge.judged(&cases[*i])).collect();
     if hypotheses.iter().all(|h| h.fit.is_none()) && !cancel.is_cancelled() {
+        if let Some(stood) = cases::did_not_move(recording, &paired, settings) {
+            return Err(stood);
+        }
         return Err(ImportError::NoViews { folder: recording.root.clone(), need: LEAST_POSES });
     }
     sort(recording, &mut hypotheses);
     let mended = judge.mended(&hypotheses);
     hypotheses.extend(mended);
+    judge.contradict_own_poses(&mut hypotheses);
     merge_equal(recording, &mut hypotheses);
     scale::contradict(&judge, &mut hypotheses);
     sort(recording, &mut hypotheses);

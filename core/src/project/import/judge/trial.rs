@@ -1,16 +1,19 @@
 //! A hypothesis against the views: a robust closed form, what it leaves, and images that contradict it.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Deref;
 use std::rc::Rc;
 
 use nalgebra::Isometry3;
 
 use super::cases::{Case, Paired};
+use super::field_of_view;
+use super::own_poses::{self, Whose};
 use super::{EXPLAINED, EXPLAINED_RAD, Sights, TIMES};
 use crate::diagnose::doctor::agreement::{self, agreement};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
+use crate::estimate::handeye::numbering::alike;
 use crate::estimate::handeye::{Mode, PosePair, subset};
 use crate::geometry::frames::Pose;
 use crate::geometry::statistics::median;
@@ -18,7 +21,7 @@ use crate::project::import::conventions::{Direction, Reading};
 use crate::project::import::formats::tree::LEAST_POSES;
 use crate::project::import::hypothesis::{Fit, Hypothesis, Source};
 use crate::project::import::pairing::{self, Pairing};
-use crate::project::import::recording::Recording;
+use crate::project::import::recording::{Recording, Role};
 use crate::project::import::settings::Settings;
 use crate::project::import::sight::Sight;
 use crate::targets::{AprilGrid, AprilTag, TargetSpec};
@@ -39,6 +42,8 @@ pub(super) struct Judge<'a> {
     pub settings: &'a Settings,
     /// Series of the target that were read already: many cases share them.
     pub read: RefCell<HashMap<(usize, Reading, Direction), Rc<Sight>>>,
+    /// Series of which it was found that their poses are a camera's own, and why: no robot's for any other camera either.
+    pub own: RefCell<BTreeMap<usize, String>>,
 }
 
 /// What the camera saw.
@@ -129,7 +134,7 @@ impl Judge<'_> {
         let chosen = subset::spread(seen.len(), most).into_iter().map(|i| seen[i]);
         let chosen: Vec<PosePair> =
             chosen.filter_map(|(sample, image)| Some(self.view(case, &sight, sample, image)?.pair)).collect();
-        let found = agreement(&sight.outer, &chosen, robust).ok()?;
+        let found = agreement(&sight.outer, &alike(&chosen, &sight.turns), robust).ok()?;
         Some((found.solution, found.median_m))
     }
 
@@ -141,13 +146,14 @@ impl Judge<'_> {
         let is_wrong =
             |sample: usize| h.fit.as_ref().is_some_and(|fit| fit.disagreeing.iter().any(|(it, _)| *it == sample));
         let right: Vec<&View> = views.iter().filter(|view| !is_wrong(view.sample)).collect();
-        let scaled = |i: usize| {
-            let PosePair { anchor_from_mount, camera_from_target } = right[i].pair;
-            let mut seen = *camera_from_target.isometry();
+        let chosen: Vec<PosePair> =
+            subset::spread(right.len(), MOST_SCALED).into_iter().map(|i| right[i].pair).collect();
+        let scaled = |pair: PosePair| {
+            let mut seen = *pair.camera_from_target.isometry();
             seen.translation.vector *= scale;
-            PosePair { anchor_from_mount, camera_from_target: Pose::from_isometry(seen) }
+            PosePair { camera_from_target: Pose::from_isometry(seen), ..pair }
         };
-        let pairs: Vec<PosePair> = subset::spread(right.len(), MOST_SCALED).into_iter().map(scaled).collect();
+        let pairs: Vec<PosePair> = alike(&chosen, &sight.turns).into_iter().map(scaled).collect();
         let outer = sight.outer.map(|point| point * scale);
         Some(agreement(&outer, &pairs, false).ok()?.median_m / scale)
     }
@@ -198,7 +204,13 @@ impl Judge<'_> {
         let median_rad = median(misfits.iter().map(|m| m.1)).unwrap_or(f64::INFINITY);
         let limit = (DISAGREES * median_m).max(DISAGREES_OF_DISTANCE * sight.distance_m);
         let mut disagreeing = Vec::new();
-        let mut contradictions: Vec<String> = are_of_the_target(sight, solution).into_iter().collect();
+        let is_near = median_m < EXPLAINED * sight.distance_m && median_rad < EXPLAINED_RAD;
+        let own = is_near.then(|| self.own_poses(case, sight, solution, &views)).flatten();
+        let mut contradictions: Vec<String> = own.into_iter().collect();
+        if matches!(case.source, Source::Track(_)) {
+            let seen: Vec<Isometry3<f64>> = views.iter().map(|view| *view.pair.camera_from_target.isometry()).collect();
+            contradictions.extend(field_of_view::outside(&seen));
+        }
         let agrees = |sample: usize| {
             views.iter().zip(&misfits).any(|(view, (misfit_m, _))| view.sample == sample && *misfit_m <= limit)
         };
@@ -237,6 +249,62 @@ impl Judge<'_> {
             target_at_m: solution.anchor_from_target.translation().norm(),
         };
         (fit, contradictions)
+    }
+
+    /// That these poses are those of a camera, and none of a robot.
+    fn own_poses(&self, case: &Case, sight: &Sight, solution: &ClosedFormSolution, views: &[View]) -> Option<String> {
+        let over_noise = |view: &View| {
+            // However the target was counted: its numbers say nothing of the noise.
+            let covariance = sight.covariances.get(view.image).filter(|_| sight.turns.is_empty())?.as_ref()?;
+            own_poses::over_noise(&chain(solution, &view.pair), view.pair.camera_from_target.isometry(), covariance)
+        };
+        let over_noise: Vec<f64> = views.iter().filter_map(over_noise).collect();
+        let of = self.source_name(case.source);
+        let track = &self.recording.tracks[case.robot];
+        match own_poses::whose(sight, solution, &over_noise)? {
+            Whose::Camera => {
+                let why = format!(
+                    "these poses are the camera's own poses, computed from the target in {of} as calibrateCamera and solvePnP do \
+                     (the target in the camera, or the camera as seen from the target), and none of a robot"
+                );
+                self.own.borrow_mut().insert(case.robot, why.clone());
+                Some(why)
+            }
+            // A person who names the series has said whose it is, and so has a file that calls it the robot's. Of one camera alone
+            // with neutral names the base may be the target's frame.
+            Whose::OtherCamera => {
+                let cameras = self.recording.streams.iter().filter(|stream| !stream.is_depth).count();
+                let may_be = matches!(case.source, Source::Track(_)) || cameras > 1;
+                (may_be && track.role == Role::Unknown && self.settings.poses.is_none()).then(|| {
+                    format!(
+                        "these poses are in the frame of the target that {of} shows, as another camera's own poses of it are, and \
+                         none of a robot; if they are a robot's, say --set poses={}",
+                        track.name
+                    )
+                })
+            }
+        }
+    }
+
+    /// Contradicts every hypothesis with a series that was found to be a camera's own.
+    pub fn contradict_own_poses(&self, hypotheses: &mut [Hypothesis]) {
+        let tracks = &self.recording.tracks;
+        let own = self.own.borrow();
+        let is_reading = |a: usize, b: usize| tracks[a].reading_of.as_ref() == Some(&tracks[b].name);
+        for h in hypotheses {
+            let is_same = |track: usize| track == h.robot || is_reading(track, h.robot) || is_reading(h.robot, track);
+            let Some((_, why)) = own.iter().find(|(track, _)| is_same(**track)) else { continue };
+            if !h.contradictions.contains(why) {
+                h.contradictions.insert(0, why.clone());
+            }
+        }
+    }
+
+    fn source_name(&self, source: Source) -> &str {
+        match source {
+            Source::Stream(i) => &self.recording.streams[i].name,
+            Source::Track(i) => &self.recording.tracks[i].name,
+        }
     }
 
     /// A pose that an image fits better than its own.
@@ -309,33 +377,21 @@ impl Judge<'_> {
     }
 }
 
-/// Poses with which camera and target would both sit where the robot's frames are: they are those of the target in the camera,
-/// in the place of the robot's.
-fn are_of_the_target(sight: &Sight, solution: &ClosedFormSolution) -> Option<String> {
-    let is_none = |pose: &Isometry3<f64>| {
-        pose.translation.vector.norm() < EXPLAINED * sight.distance_m && pose.rotation.angle() < EXPLAINED_RAD
-    };
-    let both = [solution.mount_from_camera.isometry(), solution.anchor_from_target.isometry()];
-    both.into_iter().all(is_none).then(|| {
-        "these poses are those of the target in the camera, as calibrateCamera and solvePnP give them, and none of a robot"
-            .to_owned()
-    })
+/// Where a solution puts the target as the camera sees it.
+fn chain(solution: &ClosedFormSolution, pair: &PosePair) -> Isometry3<f64> {
+    let chain = solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
+    *chain.isometry()
 }
 
-/// How far a solution puts the target from where it was seen, metres and radians; of a target that looks the same after half
-/// a turn the nearer of both.
+/// How far a solution puts the target from where it was seen, metres and radians; of a target that looks the same after a
+/// turn in the nearest way to count it.
 fn misfit(sight: &Sight, solution: &ClosedFormSolution, pair: &PosePair) -> (f64, f64) {
-    let chain = solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
-    let chain = chain.isometry();
+    let chain = chain(solution, pair);
     let seen = *pair.camera_from_target.isometry();
-    let of =
-        |seen: &Isometry3<f64>| (agreement::misfit(&sight.outer, chain, seen), chain.rotation.angle_to(&seen.rotation));
-    let plain = of(&seen);
-    match &sight.half_turn {
-        Some(turn) => {
-            let turned = of(&(seen * turn));
-            if turned.0 < plain.0 { turned } else { plain }
-        }
-        None => plain,
-    }
+    let of = |seen: &Isometry3<f64>| {
+        (agreement::misfit(&sight.outer, &chain, seen), chain.rotation.angle_to(&seen.rotation))
+    };
+    let ways = std::iter::once(seen).chain(sight.turns.others(&seen)).map(|seen| of(&seen));
+    // The first of equals, which is as it was detected.
+    ways.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, f64::INFINITY))
 }

@@ -13,6 +13,7 @@ use nalgebra::UnitQuaternion;
 use super::EXPLAINED_RAD;
 use super::cases::Case;
 use super::trial::Judge;
+use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::subset;
 use crate::project::import::conventions::{AngleUnit, Reading, RotationForm};
 use crate::project::import::hypothesis::Source;
@@ -64,9 +65,9 @@ impl Read<'_> {
     /// By how much the angles of robot and target differ, radians: that of the better quarter of the pairs of views.
     fn apart_rad(&mut self, case: &Case) -> Option<f64> {
         let (robot, target) = (self.track(case.robot, &case.reading), self.source(case)?);
-        let half_turn = match case.source {
-            Source::Stream(stream) => self.judge.sights.streams.get(stream)?.as_ref()?.half_turn.map(|it| it.rotation),
-            Source::Track(_) => None,
+        let turns = match case.source {
+            Source::Stream(stream) => self.judge.sights.streams.get(stream)?.as_ref()?.turns.clone(),
+            Source::Track(_) => Turns::default(),
         };
         let view =
             |(sample, image): (usize, &Option<usize>)| Some(((*robot.get(sample)?)?, (*target.get((*image)?)?)?));
@@ -77,9 +78,11 @@ impl Read<'_> {
         for (i, (robot, seen)) in chosen.iter().map(|i| &views[*i]).enumerate() {
             for (other_robot, other_seen) in chosen[..i].iter().map(|i| &views[*i]) {
                 let turned = robot.angle_to(other_robot);
-                let plain = (turned - seen.angle_to(other_seen)).abs();
-                let flipped = half_turn.map_or(plain, |half| (turned - (seen * half).angle_to(other_seen)).abs());
-                apart.push(plain.min(flipped));
+                let ways = turns.quarters().map(|quarters| {
+                    let seen = turns.motion(quarters).map_or(*seen, |motion| seen * motion.rotation);
+                    (turned - seen.angle_to(other_seen)).abs()
+                });
+                apart.push(ways.fold(f64::INFINITY, f64::min));
             }
         }
         apart.sort_by(f64::total_cmp);

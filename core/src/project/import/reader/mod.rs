@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use super::folder;
 use super::formats::tree::{self, LEAST_POSES};
 use super::formats::{
-    blocks, board_words, easy_handeye, industrial_calibration, intrinsics, joints, npz, program, rosbag, table, visp,
+    blocks, board_words, corners, easy_handeye, industrial_calibration, intrinsics, joints, npz, program, rosbag,
+    table, text_camera, visp, xml,
 };
-use super::recording::{FoundTarget, Known, Recording, Track};
+use super::recording::{FoundTarget, Known, Recording, Stream, Track};
 use super::value::{self, Value};
 use crate::estimate::handeye::Mode;
 
@@ -75,13 +76,16 @@ impl<'a> Reader<'a> {
                 reader.recording.tracks.extend(program::read(&file.display().to_string(), text));
             }),
             "npz" | "npy" => self.arrays(members),
-            "xml" => self.each(members, |reader, file, text| {
-                let name = file.display().to_string();
-                reader.recording.cameras.extend(visp::camera(text, &name));
-                if let Some(value) = value::opencv_xml(text) {
-                    reader.single(file, &value);
+            "xml" => {
+                let mut values = Vec::new();
+                for (file, number) in members {
+                    let Some(text) = self.text(file) else { continue };
+                    self.recording.cameras.extend(visp::camera(&text, &file.display().to_string()));
+                    let value = value::opencv_xml(&text).or_else(|| xml::document(&text));
+                    values.extend(value.map(|value| (file.clone(), *number, value)));
                 }
-            }),
+                self.values(&values);
+            }
             "cameramodel" => self.each(members, |reader, file, text| {
                 let camera = intrinsics::mrcal(text, &file.display().to_string());
                 reader.recording.cameras.extend(camera);
@@ -109,6 +113,16 @@ impl<'a> Reader<'a> {
         self.recording.tracks.truncate(tracks);
         self.recording.joints.truncate(joints);
         self.recording.rows.truncate(rows);
+    }
+
+    /// The images in folders below that a file which was named says: it was named alone, and what lies around it was not looked at.
+    pub fn named_images(&mut self) {
+        let names = self.recording.tracks.iter().flat_map(|track| &track.samples).filter_map(|it| it.image.as_deref());
+        let files = folder::images_below(self.root, names);
+        let known = |stream: &Stream| self.recording.streams.iter().any(|it| it.name == stream.name);
+        let mut streams = folder::streams(self.root, &files, &mut Vec::new());
+        streams.retain(|stream| !known(stream));
+        self.recording.streams.extend(streams);
     }
 
     /// Files of a bag of ROS 2 with its description beside them are one, compressed or not; others are each a bag.
@@ -161,6 +175,9 @@ impl<'a> Reader<'a> {
     }
 
     fn values(&mut self, read: &[(PathBuf, Option<u64>, Value)]) {
+        let (streams, targets) = corners::streams(read);
+        self.recording.streams.extend(streams);
+        self.recording.targets.extend(targets);
         if read.len() >= LEAST_POSES && self.one_to_a_file(read) {
             return;
         }
@@ -239,6 +256,7 @@ impl<'a> Reader<'a> {
         for (file, _, text) in texts {
             let name = file.display().to_string();
             self.recording.targets.extend(visp::target(&text, &name));
+            self.recording.cameras.extend(text_camera::read(&text, &file, self.root));
             if let Some(track) = program::read(&name, &text) {
                 self.recording.tracks.push(track);
                 continue;

@@ -13,7 +13,7 @@ impl Reader<'_> {
     /// A pose to a file; whether it is so.
     pub(super) fn one_to_a_file(&mut self, read: &[(PathBuf, Option<u64>, Value)]) -> bool {
         // Files that are each a series have first poses, which are none together.
-        let is_series = |value: &Value| !tree::series(value, "").is_empty();
+        let is_series = |value: &Value| tree::series(value, "").iter().any(|track| !track.is_still());
         let are_series = read.iter().filter(|(.., value)| is_series(value)).count() * 2 > read.len();
         let are_vectors = read.iter().filter(|(.., value)| visp::is_pose(value)).count() * 2 > read.len();
         let mut by_path: Vec<(String, Stated, Vec<Sample>)> = Vec::new();
@@ -57,7 +57,7 @@ impl Reader<'_> {
             let found = self.recording.tracks.get_mut(before..).unwrap_or_default();
             tree::call_after_files(found, &files, role);
         }
-        if self.recording.tracks.len() > before {
+        if self.recording.tracks[before..].iter().any(|track| !track.is_still()) {
             return true;
         }
         let values = read.iter().filter_map(|(file, number, value)| {

@@ -48,6 +48,7 @@ pub(super) fn unpack(
                         images: Vec::new(),
                         size: (image.width(), image.height()),
                         is_depth: matches!(image, DynamicImage::ImageLuma16(_)),
+                        points: None,
                     });
                     stream.images.push(ImageFile {
                         path,

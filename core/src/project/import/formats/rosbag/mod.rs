@@ -180,7 +180,8 @@ fn track(
         direction: Some(Known::by(why, Direction::Forward)),
         ..Stated::default()
     };
-    let mut track = tree::track(format!("{file}:{name}"), "robot", stated, samples)?;
+    let mut track =
+        tree::track(format!("{file}:{name}"), "robot", stated, samples).filter(|track| !track.is_still())?;
     track.role = Role::Robot;
     Some(track)
 }

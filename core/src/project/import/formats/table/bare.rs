@@ -50,7 +50,7 @@ pub(super) fn without_header(file: &str, lines: &[&Line]) -> Vec<Track> {
     let mut widths: Vec<Vec<Row>> = by_width.into_values().rev().collect();
     widths.sort_by_key(|rows| std::cmp::Reverse(rows.len()));
     widths.retain(|rows| MOST_ROWS_TO_A_POSE * rows.len() >= lines.len());
-    let mut found = widths.into_iter().map(|mut rows| {
+    let found = widths.into_iter().map(|mut rows| {
         // What stands in all rows is no name of one.
         let first = rows.first().and_then(|row| row.image.clone());
         if rows.len() > 1 && rows.iter().all(|row| row.image == first) {
@@ -60,7 +60,18 @@ pub(super) fn without_header(file: &str, lines: &[&Line]) -> Vec<Track> {
         }
         tracks(file, &rows)
     });
-    let mut tracks = found.find(|tracks| !tracks.is_empty()).unwrap_or_default();
+    let mut still = Vec::new();
+    let mut tracks = Vec::new();
+    for of_width in found {
+        if of_width.iter().any(|track| !track.is_still()) {
+            tracks = of_width;
+            break;
+        }
+        still.extend(of_width);
+    }
+    if tracks.is_empty() {
+        tracks = still;
+    }
     for track in &mut tracks {
         // A table is not named after what it is of as often as a field is.
         track.role = if tree::is_of_target(file) { Role::Target } else { Role::Unknown };
@@ -178,6 +189,10 @@ fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
         let index = index.filter(|i| *i < first);
         Layout { first, width: wide, is_rotation_first, order: Order::Plain, index, joints }
     };
+    let sides = side_by_side(width, &most, &with);
+    if sides.iter().filter(|layout| layout.order == Order::Plain).count() > 1 {
+        return sides;
+    }
     for wide in [16, 12] {
         for first in 0..=width.saturating_sub(wide) {
             if wide <= width && most(&|row| rigid(&row[first..first + wide]).is_some()) {
@@ -216,14 +231,50 @@ fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
         // A number or a time before it.
         7 if counts(rows, 0) || grows(rows) => six(1),
         8 if counts(rows, 0) || grows(rows) => six(2),
-        // With joint values, before or behind.
+        // Two poses, or one with joint values before or behind.
         12 | 13 => {
             let first = width - 12;
-            let before = Layout { joints: Some(first..first + 6), ..with(first + 6, 6, false) };
-            vec![with(first, 6, false), before]
+            let mut second: Vec<Layout> = six(first + 6);
+            second.iter_mut().for_each(|layout| layout.joints = Some(first..first + 6));
+            [six(first), second].concat()
         }
+        14 if counts(rows, 0) || grows(rows) => [six(2), six(8)].concat(),
         _ => Vec::new(),
     }
+}
+
+/// Poses that are known by their numbers, one beside the other in a row: of the robot and of the target.
+fn side_by_side(
+    width: usize,
+    most: &dyn Fn(&dyn Fn(&[f64]) -> bool) -> bool,
+    with: &dyn Fn(usize, usize, bool) -> Layout,
+) -> Vec<Layout> {
+    let mut found: Vec<Layout> = Vec::new();
+    let mut first = 0;
+    while first < width {
+        let has = |wide: usize| first + wide <= width;
+        let before = found.len();
+        if let Some(wide) =
+            [16, 12].into_iter().find(|w| has(*w) && most(&|row| rigid(&row[first..first + w]).is_some()))
+        {
+            found.push(with(first, wide, false));
+        } else if let Some(is_rotation_first) = [false, true].into_iter().find(|is_first| {
+            let at = if *is_first { first } else { first + 3 };
+            has(12) && most(&|row| rotation(&row[at..at + 9]).is_some())
+        }) {
+            let plain = with(first, 12, is_rotation_first);
+            found.extend([plain.clone(), Layout { order: Order::ByColumns, ..plain }]);
+        } else if let Some(is_rotation_first) = [false, true].into_iter().find(|is_first| {
+            let at = if *is_first { first } else { first + 3 };
+            has(7) && most(&|row| is_unit(&row[at..at + 4]))
+        }) {
+            found.push(with(first, 7, is_rotation_first));
+        }
+        // What stands beside them is another pose, and no joint values.
+        found[before..].iter_mut().for_each(|layout| layout.joints = None);
+        first = found.get(before).map_or(first + 1, |layout| layout.first + layout.width);
+    }
+    found
 }
 
 fn counts(rows: &[&[f64]], column: usize) -> bool {

@@ -3,6 +3,7 @@
 pub(in crate::project::import::formats) mod bare;
 mod cells;
 mod header;
+mod labels;
 
 use std::collections::BTreeMap;
 
@@ -15,11 +16,27 @@ use cells::Line;
 /// The series of poses in a text, which may be none.
 pub(in crate::project::import) fn read(file: &str, text: &str) -> Vec<Track> {
     let lines = cells::lines(text);
-    if let Some(tracks) = header::with_header(file, &lines) {
+    let groups = labels::groups(&lines).unwrap_or_default();
+    let mut tracks = Vec::new();
+    for group in groups {
+        let mut of_group = of_lines(&format!("{file}:{}", group.label), &group.lines);
+        for track in &mut of_group {
+            track.role = group.role;
+            if track.samples.len() == group.numbers.len() {
+                track.samples.iter_mut().zip(&group.numbers).for_each(|(sample, number)| sample.number = Some(*number));
+            }
+        }
+        tracks.extend(of_group);
+    }
+    if tracks.is_empty() { of_lines(file, &lines) } else { tracks }
+}
+
+fn of_lines(file: &str, lines: &[Line]) -> Vec<Track> {
+    if let Some(tracks) = header::with_header(file, lines) {
         return tracks;
     }
     // Six joint values are no pose.
-    if header::joints(file, &lines).is_some() {
+    if header::joints(file, lines).is_some() {
         return Vec::new();
     }
     let rows: Vec<&Line> = lines.iter().filter(|line| line.is_numeric()).collect();
