@@ -57,8 +57,8 @@ pub fn of_machine(refusal: &Refusal) -> Why {
         }
         Refusal::TooSimilar(similar) => {
             let why = text!(
-                "Capture {id} was taken only {distance} mm and {angle}° from here and says the same: move or turn further and \
-                 capture again",
+                "Capture {id} was taken only {distance} mm and {angle}° from here and adds no information: move or \
+                 turn further and capture again",
                 id = similar.id,
                 distance = format!("{:.1}", similar.distance_m * 1e3),
                 angle = format!("{:.1}", similar.angle_rad.to_degrees())
@@ -117,7 +117,7 @@ pub fn cancelled() -> Why {
 
 /// A newer one takes its place.
 pub fn another_capture() -> Why {
-    (RefusalKind::Cancelled, text!("The capture was given up for another one"))
+    (RefusalKind::Cancelled, text!("The capture was replaced by a newer one"))
 }
 
 /// It would have been measured on another board.

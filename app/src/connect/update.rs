@@ -124,7 +124,9 @@ impl App {
                     tracing::warn!(%error, "the connection before was left alone");
                 }
             }
-            Err(error) => self.say(Severity::Error, text!("The connection was not begun: {error}", error = error)),
+            Err(error) => {
+                self.say(Severity::Error, text!("The connection could not be started: {error}", error = error))
+            }
         }
         self.model.source = source;
         self.model.capture = None;

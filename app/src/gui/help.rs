@@ -14,7 +14,7 @@ pub fn keys_ui(ui: &mut Ui, model: &Model) {
     ui.label(theme::title(tr!(language, "Keyboard"), TITLE));
     let note = tr!(
         language,
-        "Esc stops the arm at any time, also while you type or a dialog is open. All other keys rest while you type."
+        "Esc stops the arm at any time, also while you type or a dialog is open. Other keys do nothing while you type."
     );
     ui.add(Label::new(RichText::new(note).color(palette.weak)).wrap());
     ui.add_space(8.0);

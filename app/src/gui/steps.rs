@@ -172,7 +172,7 @@ fn solve(facts: &Facts) -> (StepState, Text) {
         return (StepState::Blocked, text!("Needs {count} poses", count = MIN_VIEWS));
     }
     match (facts.solving, facts.solved, facts.expected_error_m) {
-        (true, ..) => (StepState::Now, text!("At work…")),
+        (true, ..) => (StepState::Now, text!("Working…")),
         (false, false, _) => (StepState::Now, text!("Ready to solve")),
         (false, true, Some(error_m)) => {
             (StepState::Done, text!("±{error} mm (95 %)", error = numbers::error_mm(error_m)))

@@ -127,7 +127,7 @@ pub fn under_way(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress
         (_, Some(_)) => {
             text!("Check {n} of {of}: a pose that is not in the fit", n = guided.checked + 1, of = CHECKS)
         }
-        (Waits::Nothing, None) => text!("Pose {n}: on the way, then a capture", n = number),
+        (Waits::Nothing, None) => text!("Pose {n}: moving there, then a capture", n = number),
         (Waits::Answer, None) => text!("Solving with {n} {n|pose|poses}", n = number - 1),
         (Waits::Choice, None) => text!("Choosing pose {n}", n = number),
     }

@@ -16,7 +16,7 @@ const TIMES: f32 = 62.0;
 pub fn log_ui(ui: &mut Ui, model: &Model, _outbox: &mut Outbox) {
     let language = model.view.language;
     if model.messages.newest().is_none() {
-        let detail = tr!(language, "Everything that happens is written down here.");
+        let detail = tr!(language, "Everything that happens is logged here.");
         empty::empty_ui(ui, tr!(language, "No messages yet"), detail);
         return;
     }

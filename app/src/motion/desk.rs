@@ -344,7 +344,7 @@ fn stopped() -> Text {
 }
 
 fn forgotten_for(after_s: f64) -> Text {
-    text!("The arm was let go: nothing was heard of the button for {seconds} s", seconds = after_s)
+    text!("The arm was stopped: no signal from the jog button for {seconds} s", seconds = after_s)
 }
 
 #[cfg(test)]

@@ -115,12 +115,12 @@ fn widening(joint: &JointFit) -> Option<EstimatedValue> {
 fn freedom(joint: &JointFit) -> EstimatedValue {
     let degrees = joint.small_sample.degrees_of_freedom;
     let value = if degrees > GAUSSIAN {
-        text!("Gaussian")
+        text!("normal")
     } else {
-        text!("{n} degrees of freedom", n = format!("{degrees:.1}"))
+        text!("Student's t with {n} degrees of freedom", n = format!("{degrees:.1}"))
     };
     EstimatedValue {
-        what: text!("Stated error of a point"),
+        what: text!("Distribution of the stated error"),
         value,
         meaning: text!(
             "The fewer degrees of freedom it rests on, the wider it is for the same noise, because the noise levels are \
@@ -186,7 +186,7 @@ mod tests {
     fn nothing_is_said_of_what_is_as_usual() {
         let lines = said(|_| ());
         assert_eq!(lines.len(), 1, "{lines:?}");
-        assert_eq!(lines[0].0, "Stated error of a point");
+        assert_eq!(lines[0].0, "Distribution of the stated error");
         assert!(lines[0].1.ends_with(" degrees of freedom"), "{lines:?}");
     }
 
@@ -235,7 +235,7 @@ mod tests {
             ("Size of the board", "100.100 ± 0.020 %"),
             ("Noise of views", "0.120 px"),
             ("Uncertainty widened", "2.0 times"),
-            ("Stated error of a point", "Gaussian"),
+            ("Distribution of the stated error", "normal"),
             ("Offsets of the joints", "1: +1.000 ± 0.010°, 2: -0.500 ± 0.010°"),
         ] {
             assert!(has(&lines, what, value), "{what}: {value} in {lines:?}");

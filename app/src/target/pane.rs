@@ -79,10 +79,10 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             TargetSpec::Chessboard(_) => {
                 tr!(
                     language,
-                    "Its ends cannot be told apart. Take one with an odd number of rows plus columns, as 10 × 7."
+                    "Its two ends look the same. Use one with an odd number of rows plus columns, such as 10 × 7."
                 )
             }
-            _ => tr!(language, "Its ends cannot be told apart. A chessboard is safer."),
+            _ => tr!(language, "Its two ends look the same. A chessboard is safer."),
         };
         form::note_ui(ui, Tone::Warning, title, detail);
     }

@@ -130,7 +130,7 @@ impl Column {
         match self {
             Self::Image => "",
             Self::Name => tr!(language, "Number of the capture, and the taught pose at which it was taken"),
-            Self::Use => tr!(language, "Captures that are not used stay in the session and touch no number"),
+            Self::Use => tr!(language, "Captures that are not used stay in the session and do not affect the result"),
             Self::Purpose => tr!(language, "Whether it enters the fit, or verifies it"),
             Self::Rms => tr!(
                 language,
@@ -144,7 +144,7 @@ impl Column {
             Self::Turn => tr!(language, "How far the fit turned the reported orientation of the tip"),
             Self::Influence => tr!(language, "How far the answer moves when this capture is left out"),
             Self::Noise => tr!(language, "Noise of a corner in this image, one sigma, measured when it was taken"),
-            Self::Flags => tr!(language, "What is remarkable; point at it to read why and what to do"),
+            Self::Flags => tr!(language, "Remarks: point at one to read why and what to do"),
         }
     }
 

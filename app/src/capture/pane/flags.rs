@@ -146,8 +146,8 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
     if row.found.contains(&FindingCode::InfluentialView) {
         let why = tr!(
             language,
-            "The answer leans on this one capture. That is no error, but more captures like it would make the answer \
-             safer."
+            "The result depends strongly on this one capture. That is not an error, but more captures like it would \
+             make the result more robust."
         );
         flag(Some(Tone::Busy), tr!(language, "Influential"), why.to_owned());
     }
@@ -155,7 +155,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         flag(Some(Tone::Busy), tr!(language, "Outlier corners"), why);
     }
     if row.excluded {
-        let why = tr!(language, "It was taken out by hand and touches no number. Tick it to use it again.");
+        let why = tr!(language, "It was excluded by hand and does not affect the result. Tick it to use it again.");
         flag(None, tr!(language, "Excluded"), why.to_owned());
     }
     flags

@@ -107,7 +107,7 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, height: f32, out
         let what = tr!(language, "Waits until robot and image stand still, then keeps image, depth and robot pose");
         capture_ui(ui, big, name, what, CapturePurpose::Calibrate);
         let name = tr!(language, "Capture for verification");
-        let what = tr!(language, "This capture never enters the fit and tells how good the calibration is");
+        let what = tr!(language, "This capture never enters the fit and shows how good the calibration is");
         capture_ui(ui, Button::new(name).min_size(Vec2::new(0.0, height)), name, what, CapturePurpose::Verify);
         frames_ui(ui, model.view.capture, language, outbox);
         sequence_ui(ui, model, hindrance, height, outbox);
@@ -172,9 +172,9 @@ pub fn hindrance(model: &Model) -> Option<&'static str> {
 fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: Language, outbox: &mut Outbox) {
     let name = tr!(language, "Images to average");
     let mut frames = options.frames;
-    let suffix = if frames == 1 { tr!(language, " image") } else { tr!(language, " images") };
-    let prefix = tr!(language, "mean of ");
-    let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).prefix(prefix).suffix(suffix);
+    let suffix =
+        if frames == 1 { tr!(language, " image per capture") } else { tr!(language, " images per capture, averaged") };
+    let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).suffix(suffix);
     let what = tr!(language, "The mean of several images has less noise: four images halve it");
     let response = ui.add(drag).on_hover_text(what);
     response.widget_info(|| WidgetInfo {

@@ -129,7 +129,7 @@ fn no_cell(why: NoCell) -> PortError {
             PortError::Later { why: Text::verbatim(error.to_string()), tries, pause }
         }
         NoCell::Over { error, tries } if tries > 1 => PortError::Hopeless(text!(
-            "{tries} starts in a row came to nothing, and there are no more by themselves: {why}. Look at the command and at \
+            "{tries} starts in a row failed, so it is not started again by itself: {why}. Look at the command and at \
              what the driver says, then try again",
             tries = tries,
             why = error

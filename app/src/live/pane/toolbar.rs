@@ -69,7 +69,7 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             (
                 ColourMap::Viridis,
                 tr!(language, "Viridis"),
-                tr!(language, "Even in brightness, and for every kind of eye"),
+                tr!(language, "Perceptually uniform, and readable with colour blindness"),
             ),
             (ColourMap::Grey, tr!(language, "Grey"), tr!(language, "Near is dark, far is light")),
         ] {

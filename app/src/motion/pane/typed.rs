@@ -117,7 +117,7 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
             typed.is_sent = true;
         }
         let is_read = model.robot.is_some();
-        if ui.add_enabled(is_read, Button::new(tr!(language, "Take where it is"))).clicked() {
+        if ui.add_enabled(is_read, Button::new(tr!(language, "Use current pose"))).clicked() {
             typed.is_edited = false;
         }
     });

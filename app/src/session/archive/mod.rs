@@ -174,7 +174,7 @@ impl Archive {
     fn begin(&mut self, folder: Option<PathBuf>, beginning: Beginning) {
         self.beginning = Some(beginning);
         let created = self.create(folder);
-        self.take(created, |error| text!("The session was not begun: {error}", error = error));
+        self.take(created, |error| text!("The session could not be created: {error}", error = error));
     }
 
     /// A session for what there is to keep.

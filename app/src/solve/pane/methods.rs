@@ -17,7 +17,10 @@ pub fn methods_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outb
     parts::section_ui(ui, tr!(language, "Methods compared"));
     parts::hint_ui(
         ui,
-        tr!(language, "Closed forms weigh no noise: they start the joint estimate and show how firm the views are."),
+        tr!(
+            language,
+            "Closed forms do not weight noise: they start the joint estimate and show how well the views determine it."
+        ),
     );
     keep_ui(ui, model, outbox);
     let answer = solved.calibration.hand_eye.map(|hand_eye| hand_eye.mount_from_camera());

@@ -44,7 +44,7 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     stated(ui, tr!(language, "Corners"), quality.sigma_px.map(|px| format!("{px:.3} px")));
     stated(ui, tr!(language, "Robot position"), quality.robot_sigma_mm.map(|mm| format!("{mm:.3} mm")));
     stated(ui, tr!(language, "Robot rotation"), quality.robot_sigma_deg.map(|deg| format!("{deg:.4}°")));
-    parts::section_ui(ui, tr!(language, "Residuals, which are no accuracy"));
+    parts::section_ui(ui, tr!(language, "Residuals (not accuracy)"));
     stated(ui, tr!(language, "Fit, RMS"), quality.rms_px.map(|px| format!("{px:.3} px")));
     // Of the model as it stands, with the robot's field where there is one: that is what the noise levels explain.
     let joint = solved.calibration.joint.as_ref();

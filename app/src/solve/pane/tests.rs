@@ -45,7 +45,7 @@ fn the_headline_is_the_expected_error_and_not_a_residual() {
     assert!(pane.sees("0.213 mm"));
     assert!(pane.sees("Expected error (95 %)"));
     assert!(pane.sees("The goal is reached"));
-    assert!(pane.sees("Residuals, which are no accuracy"));
+    assert!(pane.sees("Residuals (not accuracy)"));
     assert!(pane.sees("Fit, RMS: 0.070 px"));
     pane.model().view.goal = Goal(0.1e-3);
     pane.steps();

@@ -60,10 +60,10 @@ fn words(path: BoardPath, language: Language) -> (&'static str, &'static str) {
     match path {
         BoardPath::Still => (tr!(language, "Still"), tr!(language, "The board stands where it is")),
         BoardPath::Circle => (tr!(language, "Circle"), tr!(language, "A circle in the plane of the board")),
-        BoardPath::FigureEight => (tr!(language, "Eight"), tr!(language, "An eight in the plane of the board")),
-        BoardPath::RandomWalk => {
-            (tr!(language, "Random"), tr!(language, "Always somewhere else, and turning a little"))
+        BoardPath::FigureEight => {
+            (tr!(language, "Eight"), tr!(language, "A figure of eight in the plane of the board"))
         }
+        BoardPath::RandomWalk => (tr!(language, "Random"), tr!(language, "Random places, with small turns")),
         BoardPath::Step => (tr!(language, "Jumps"), tr!(language, "Every two seconds at another of five places")),
     }
 }

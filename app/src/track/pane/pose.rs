@@ -62,7 +62,7 @@ fn estimate_ui(ui: &mut Ui, estimate: &Estimate, rotation: RotationFormat, langu
     let pose = &estimate.base_from_target;
     let exact = tr!(
         language,
-        "As far as corners and motion cause it; the calibration is taken as exact. Its own error is stated with the result."
+        "The part that corners and motion cause; the calibration is taken as exact. Its own error is stated with the result."
     );
     let what = tr!(language, "The first corner of the board, x y z in the base");
     parts::stated_ui(

@@ -56,7 +56,7 @@ fn without_verification(model: &Model) -> &'static str {
     let language = model.view.language;
     let is_kept = model.document().captures.iter().any(|it| it.role == Role::Verification && !it.excluded);
     if !is_kept {
-        tr!(language, "No captures for verification yet. Ten say something about the average.")
+        tr!(language, "No captures for verification yet. About ten are needed for a meaningful average.")
     } else if model.solve.fresh {
         tr!(language, "The board was not found in any capture for verification.")
     } else {

@@ -34,16 +34,16 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
             let limit = format!("{:.2}", consistency.limit);
             if consistency.is_consistent() {
                 let text = text!(
-                    "The errors are of the size that the calibration states: {ratio} times in the square, up to {limit} \
-                     is expected in 99 of 100 cases",
+                    "The errors are of the size that the calibration states: their mean square is {ratio} times the \
+                     expected one, and at most {limit} times in 99 of 100 cases",
                     ratio = ratio,
                     limit = limit
                 );
                 (palette.good, text)
             } else {
                 let text = text!(
-                    "The errors are larger than the calibration states: {ratio} times in the square, where {limit} is \
-                     the most in 99 of 100 cases. The board may have been moved, or the arm is less exact here than \
+                    "The errors are larger than the calibration states: their mean square is {ratio} times the expected \
+                     one, and at most {limit} times in 99 of 100 cases. The board may have been moved, or the arm is less exact here than \
                      where the calibration was made",
                     ratio = ratio,
                     limit = limit

@@ -162,7 +162,7 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             numbers.push(evidence("joint", (joint + 1) as f64, ""));
             numbers.push(evidence("offset", deg, "°"));
             numbers.push(evidence("offset_sigma", sigma, "°"));
-            let to_do = text!("Master the arm anew, or let the offset be estimated with the calibration.");
+            let to_do = text!("Master the arm again, or let the offset be estimated with the calibration.");
             (FindingCode::JointOffset, what, to_do, estimate("offset", deg, Some(sigma), "°"))
         }
     };

@@ -41,7 +41,7 @@ pub(super) fn not_finite(sight: &SessionViews) -> Option<Finding> {
         count = count,
         list = listed(names)
     );
-    let text = Text::sentences([what, text!("Write the table anew, or leave them out.")]);
+    let text = Text::sentences([what, text!("Write the table again, or leave them out.")]);
     let mut finding = Finding::new(FindingCode::NotFinite, Severity::Problem, text);
     finding.views.clone_from(names);
     Some(finding.with("views", count as f64, ""))
