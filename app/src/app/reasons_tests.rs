@@ -97,7 +97,7 @@ fn poses_that_check_the_answer_are_gone_on_with_as_the_others_are() {
     let sequence = app.model.sequence.as_mut().expect("a sequence");
     sequence.purpose = Some(CapturePurpose::Verify);
     let guided = sequence.guided.as_deref_mut().expect("guided");
-    (guided.ending, guided.waits) = (Some(Ending::GoalReached { error_m: 3e-4 }), Waits::Confirmation);
+    (guided.ending, guided.waits) = (Some(Ending::GoalReached { error_m: 3e-4 }), Waits::Nothing);
     app.apply(Command::Stop);
     assert!(!app.model().sequence_runs);
     assert!(app.model().sequence.as_ref().is_some_and(PoseSequence::can_continue));

@@ -276,6 +276,6 @@ mod tests {
         assert!(pane.nothing_is_cut_off());
         pane.model().session.folder = Some(last);
         pane.steps();
-        assert!(!pane.sees("again"));
+        assert!(!pane.sees("2026-11-22 again"));
     }
 }

@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn a_few_letters_find_a_command() {
         for (typed, name) in
-            [("reset", "Reset layout"), ("rl", "Reset layout"), ("lt", "Light theme"), ("stop", "Stop the arm")]
+            [("reset l", "Reset layout"), ("rl", "Reset layout"), ("light", "Light theme"), ("stop", "Stop the arm")]
         {
             assert_eq!(best(typed, Language::English), Some(name), "{typed}");
         }
@@ -197,6 +197,6 @@ mod tests {
 
     #[test]
     fn english_letters_find_a_command_in_chinese() {
-        assert_eq!(best("reset", Language::Chinese), Some(tr!(Language::Chinese, "Reset layout")));
+        assert_eq!(best("reset l", Language::Chinese), Some(tr!(Language::Chinese, "Reset layout")));
     }
 }

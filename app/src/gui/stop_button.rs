@@ -76,7 +76,8 @@ pub fn stop_button_ui(ui: &mut Ui, button: Button<'_>) -> Response {
     let rect = response.interact_rect.intersect(ui.clip_rect());
     let is_covered = |layer: LayerId| layer != ui.layer_id();
     if rect.is_positive() && !ui.ctx().layer_id_at(rect.center()).is_some_and(is_covered) {
-        let frame = ui.ctx().cumulative_frame_nr();
+        // Whatever asks the context does so before its lock is taken.
+        let (frame, has_keyboard) = (ui.ctx().cumulative_frame_nr(), response.has_focus());
         ui.data_mut(|data| {
             let drawn = data.get_temp_mut_or_default::<Drawn>(id());
             if drawn.frame != frame {
@@ -84,7 +85,7 @@ pub fn stop_button_ui(ui: &mut Ui, button: Button<'_>) -> Response {
             }
             drawn.places.rects.push(rect);
             drawn.places.controls.push(response.id.value().to_string());
-            drawn.places.has_keyboard |= response.has_focus();
+            drawn.places.has_keyboard |= has_keyboard;
         });
     }
     response

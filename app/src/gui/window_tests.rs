@@ -87,8 +87,8 @@ fn words_of_a_simulator_stand_nowhere_behind_a_driver() {
                 assert!(!silent.sees(word), "{word} in {place}, armed {is_armed}");
             }
         };
-        // Where another cell is chosen, the simulator is one of them.
-        for pane in Pane::ALL.into_iter().filter(|pane| *pane != Pane::Connect) {
+        // Where another cell is chosen the simulator is one of them, and where files are written it is who reads some.
+        for pane in Pane::ALL.into_iter().filter(|pane| !matches!(pane, Pane::Connect | Pane::Export)) {
             silent.show(pane);
             if !silent.harness.state_mut().layout().is_in_front(Pane::Connect) {
                 none_of_it(&silent, &format!("{pane:?}"));
@@ -147,12 +147,15 @@ fn the_robot_is_shown_in_millimetres_and_degrees() {
 #[test]
 fn stop_is_one_click_away_in_every_state() {
     let mut silent = Silent::new(CellSource::default());
-    for prepare in [LinkState::StartingCell { why: None }, connected()] {
+    for (prepare, before, after) in [
+        (LinkState::StartingCell { why: None }, "STOP cannot act", "STOP cannot act"),
+        (connected(), "STOP", "STOPPING…"),
+    ] {
         silent.links(&prepare);
-        silent.harness.get_by_label("STOP").click();
+        silent.harness.get_by_label(before).click();
         silent.steps();
         assert!(silent.app().model().stop_pending);
-        assert!(silent.sees("STOPPING…"));
+        assert!(silent.sees(after));
         silent.absorb(Event::Stopped);
     }
 }

@@ -95,7 +95,7 @@ fn behind_a_driver_it_is_offered_where_the_chain_of_joints_is_named_and_can_begi
 #[test]
 fn what_is_under_way_and_why_stands_in_the_pane() {
     let pane = self::pane(under_way(Waits::Nothing, None));
-    assert!(pane.sees("Pose 2: on the way, then a capture"));
+    assert!(pane.sees("Pose 2: moving there, then a capture"));
     assert!(pane.sees("Lowers the expected error from 0.800 to 0.500 mm, mostly in the rotation of the camera"));
     assert!(pane.sees("goal 0.300 mm"), "the goal that it began with");
     assert!(self::pane(under_way(Waits::Choice, None)).sees("Choosing pose 2"));

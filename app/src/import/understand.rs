@@ -102,7 +102,8 @@ pub fn clocks_said(clocks: &Clocks) -> Text {
 /// That not everything was tried, and what to do.
 pub fn untried_said(judgement: &Judgement) -> Text {
     text!(
-        "there are more hypotheses than are tried: {untried} of them and {series} pairs of series were left out. Name the series of          the robot (poses=NAME) and of the target (target_poses=NAME), or keep one recording in the folder",
+        "there are more hypotheses than are tried: {untried} of them and {series} pairs of series were left out. Name the series of \
+         the robot (poses=NAME) and of the target (target_poses=NAME), or keep one recording in the folder",
         untried = judgement.untried,
         series = judgement.sources_untried
     )

@@ -116,7 +116,8 @@ fn said(error: NotUnderstood) -> Text {
             seconds = time.as_secs()
         ),
         NotUnderstood::Import(ImportError::Stopped { why: Spent::Unpacked(bytes), .. }) => text!(
-            "Reading was stopped: its compressed files unpack to more than {size} GiB. Unpack them yourself, or use              “handeye import --unpack”",
+            "Reading was stopped: its compressed files unpack to more than {size} GiB. Unpack them yourself, or use \
+             “handeye import --unpack”",
             size = bytes >> 30
         ),
         error => Text::verbatim(error.to_string()),

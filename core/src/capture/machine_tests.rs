@@ -1,6 +1,6 @@
 use nalgebra::{Isometry3, Vector2, Vector3};
 
-use super::{Machine, Plan, Progress, Refusal, RobotRate, Wait};
+use super::{Machine, NO_IMAGES_S, Plan, Progress, Refusal, RobotRate, Wait};
 use crate::geometry::frames::Pose;
 use crate::targets::observation::Corner;
 use crate::testing::flat_board::{Board, Instant, image};
@@ -172,27 +172,28 @@ fn a_simulation_that_rests_is_told_from_a_camera_that_is_gone() {
     let still = || images(1.0, |_| 0.0);
     // No image at all.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
-    assert_eq!(machine.pass_time(REQUESTED_S + 1.9, None), Progress::Waits(Wait::ForImage));
-    assert_eq!(machine.pass_time(REQUESTED_S + 2.1, None), Progress::Refused(Refusal::NoImages));
+    assert_eq!(machine.pass_time(REQUESTED_S + NO_IMAGES_S - 0.1, None), Progress::Waits(Wait::ForImage));
+    assert_eq!(machine.pass_time(REQUESTED_S + NO_IMAGES_S + 0.1, None), Progress::Refused(Refusal::NoImages));
     // The camera answers, and has no new image.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
     assert_eq!(
-        machine.pass_time(REQUESTED_S + 2.1, Some(REQUESTED_S + 2.0)),
+        machine.pass_time(REQUESTED_S + NO_IMAGES_S + 0.1, Some(REQUESTED_S + NO_IMAGES_S)),
         Progress::Refused(Refusal::Paused),
         "it was heard after the request"
     );
     // Images come, all of the same instant.
     let mut machine = Machine::new(plan(1), REQUESTED_S);
-    for instant in still().map(|instant| Instant { sim_time_s: 7.0, ..instant }).take(60) {
+    for instant in still().map(|instant| Instant { sim_time_s: 7.0, ..instant }) {
         machine.see(&instant.shot());
         machine.pass_time(instant.received_s, None);
     }
-    assert_eq!(machine.progress(), Progress::Refused(Refusal::Paused));
+    let later_s = REQUESTED_S + NO_IMAGES_S + 1.0;
+    assert_eq!(machine.pass_time(later_s, Some(later_s)), Progress::Refused(Refusal::Paused));
     // It stops in the middle of an average.
     let mut machine = Machine::new(plan(10), REQUESTED_S);
     let progress = run(&mut machine, still().take(6));
     assert_eq!(progress.last(), Some(&Progress::Waits(Wait::Averaging { done: 3, of: 10 })));
-    assert_eq!(machine.pass_time(REQUESTED_S + 2.4, None), Progress::Refused(Refusal::NoImages));
+    assert_eq!(machine.pass_time(REQUESTED_S + NO_IMAGES_S + 0.4, None), Progress::Refused(Refusal::NoImages));
 }
 
 #[test]

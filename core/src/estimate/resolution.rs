@@ -10,9 +10,9 @@
 
 use crate::estimate::handeye::joint::Noise;
 
-/// What all corners of a view may be off by together, pixels: three times half a grey level over a contrast of 160, which is how
-/// far an edge moves when all its pixels are rounded alike.
-pub(crate) const CORNER_PX: f64 = 0.01;
+/// What all corners of a view may be off by together, pixels: half a grey level over a contrast of 160, which is how far an edge
+/// moves when all its pixels are rounded alike. More would hide what sharp images of 0.03 px show of a lens.
+pub(crate) const CORNER_PX: f64 = 0.003;
 /// A distance of a corner, or the RMS of a view, that is as good as images get, pixels: the detector's own errors are 0.03 px at
 /// the most in images without noise, and 0.04 px RMS with ten grey levels of it.
 pub(crate) const FINE_PX: f64 = 0.05;
@@ -48,8 +48,8 @@ mod tests {
         assert_eq!(pose_variance_px2(0.01, 70), 0.01);
         let least = judged_by(&Noise::EXACT);
         assert_eq!((least.robot_m, least.robot_rad), (PLACE_M, ANGLE_RAD));
-        // A hundredth of a pixel of every corner is one standard deviation of the pose, however many there are.
-        assert!((pose_variance_px2(0.0, 70) - 70.0 * 1e-4).abs() < 1e-15);
+        // That shift of every corner is one standard deviation of the pose, however many there are.
+        assert!((pose_variance_px2(0.0, 70) - 70.0 * 9e-6).abs() < 1e-15);
         assert!(!is_resolved(9e-6, 1.7e-5) && is_resolved(1e-5, 0.0) && is_resolved(0.0, 1.8e-5));
     }
 }

@@ -185,7 +185,10 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
             let said = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale);
             if let Some(estimate) = said.and_then(|h| h.estimate) {
                 told_of_size += 1;
-                assert_eq!((estimate.value, estimate.sigma), (size.scale, Some(size.sigma)), "{mode:?} {seed}");
+                // But for the rounding of a difference to one.
+                let apart = |a: f64, b: f64| (a - b).abs() / b;
+                assert!(apart(estimate.value, size.scale) < 1e-9, "{mode:?} {seed}: {estimate:?} {size:?}");
+                assert!(estimate.sigma.is_some_and(|sigma| apart(sigma, size.sigma) < 1e-9), "{mode:?} {seed}");
             }
             let is_accused = diagnosis.findings.iter().any(|finding| finding.code == FindingCode::WrongScale);
             assert_eq!(is_accused, scale > 0.0, "{mode:?} {seed}: {size:?} {said:?}");

@@ -118,7 +118,7 @@ mod tests {
         assert!(!watch.take(place(0.0, 0.5)) && watch.stands().is_none(), "one state says nothing");
         assert!(!watch.take(place(0.1, 0.6)) && watch.stands() == Some(false));
         assert!(!watch.take(place(0.2, 0.6)) && watch.stands() == Some(true));
-        assert!(watch.take(place(0.3, 0.6)));
+        assert!(watch.take(place(0.31, 0.6)));
         assert_eq!(watch.moved(), Some(Moved::Joint { index: 1, from: 0.5, to: 0.6 }));
         // A thousandth a state is a twentieth of a radian a second.
         let mut watch = RestWatch::default();

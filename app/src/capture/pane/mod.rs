@@ -172,8 +172,7 @@ pub fn hindrance(model: &Model) -> Option<&'static str> {
 fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: Language, outbox: &mut Outbox) {
     let name = tr!(language, "Images to average");
     let mut frames = options.frames;
-    let suffix =
-        if frames == 1 { tr!(language, " image per capture") } else { tr!(language, " images per capture, averaged") };
+    let suffix = if frames == 1 { tr!(language, " image") } else { tr!(language, " images averaged") };
     let drag = DragValue::new(&mut frames).range(1..=MOST_FRAMES).speed(0.1).suffix(suffix);
     let what = tr!(language, "The mean of several images has less noise: four images halve it");
     let response = ui.add(drag).on_hover_text(what);

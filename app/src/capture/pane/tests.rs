@@ -233,11 +233,8 @@ fn a_thousand_captures_cost_what_can_be_seen_of_them() {
 fn guided_capture_that_was_broken_off_between_two_poses_or_at_a_check_is_continued() {
     let guided = |ending| {
         let mut model = sample::solved();
-        let guided = GuidedProgress {
-            ending,
-            waits: Waits::Confirmation,
-            ..GuidedProgress::new(GuidedOptions::default(), 90.0)
-        };
+        let guided =
+            GuidedProgress { ending, waits: Waits::Nothing, ..GuidedProgress::new(GuidedOptions::default(), 90.0) };
         let purpose = if guided.ending.is_some() { CapturePurpose::Verify } else { CapturePurpose::Calibrate };
         model.sequence = Some(PoseSequence {
             names: vec!["G1".to_owned()],

@@ -33,7 +33,8 @@ impl Hold {
 
     /// A button of the pane.
     pub fn button(&mut self, ui: &Ui, response: &Response, jog: Jog) {
-        let is_down = response.is_pointer_button_down_on() && response.contains_pointer();
+        // One that has become disabled under the pointer is let go.
+        let is_down = response.enabled() && response.is_pointer_button_down_on() && response.contains_pointer();
         // Who comes back with the button still down has let go: a jog begins with a press only.
         let begins = ui.input(|input| input.pointer.any_pressed());
         if is_down && (begins || self.before == Some(jog)) {

@@ -62,7 +62,7 @@ fn errors_that_are_too_large_are_said_to_be() {
             verification.consistency.as_mut().expect("stated").ratio = 50.0;
         }
     }));
-    assert!(pane.sees("The errors are larger than the calibration states: 50.00 times"));
+    assert!(pane.sees("The errors are larger than the calibration states: their mean square is 50.00 times"));
     assert!(pane.nothing_is_cut_off());
 }
 

@@ -123,7 +123,8 @@ fn stop_at_a_page_waits_for_no_frame() {
             let at = watch.joint_values().expect("a call");
             let mut goal = start;
             goal[0] += if at[0] > start[0] { -2.0 } else { 2.0 };
-            let moving = scope.spawn(|| {
+            let limits = limits.clone();
+            let moving = scope.spawn(move || {
                 // It is stopped on its way.
                 let _stopped = mover.move_to_joints(&goal, &limits, &CancelToken::default()).is_ok();
                 mover

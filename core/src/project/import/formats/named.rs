@@ -224,7 +224,7 @@ mod tests {
             r#"{"robot_translation_mm": [1, 2, 3], "robot_rotation_deg": [10, 20, 30],
                 "T_cam_target_rvec": [[0.1], [0.2], [0.3]], "T_cam_target_tvec": [[4], [5], [6]], "lone_tvec": [7, 8, 9]}"#,
         );
-        let [(target, seen, meant), (robot, at, said)] = found.as_slice() else { panic!("{found:?}") };
+        let [(robot, at, said), (target, seen, meant)] = found.as_slice() else { panic!("{found:?}") };
         assert_eq!((robot.as_str(), target.as_str()), ("robot", "T_cam_target"));
         assert_eq!(*at, Numbers::Angles([1.0, 2.0, 3.0, 10.0, 20.0, 30.0]));
         assert_eq!(said.length.as_ref().map(|known| known.value), Some(LengthUnit::Millimetre));

@@ -179,6 +179,7 @@ pub fn judge(
     let mended = judge.mended(&hypotheses);
     hypotheses.extend(mended);
     judge.contradict_own_poses(&mut hypotheses);
+    judge.contradict_outside(&mut hypotheses);
     merge_equal(recording, &mut hypotheses);
     scale::contradict(&judge, &mut hypotheses);
     sort(recording, &mut hypotheses);

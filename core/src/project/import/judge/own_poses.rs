@@ -93,13 +93,15 @@ pub(super) fn over_noise(expected: &Isometry3<f64>, seen: &Isometry3<f64>, covar
 /// Whether a rotation turns axes into axes.
 fn is_along_axes(rotation: &UnitQuaternion<f64>) -> bool {
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
-    let rotation = rotation.to_rotation_matrix();
+    let matrix = rotation.to_rotation_matrix();
     ORDERS.iter().any(|order| {
         let mut nearest = Matrix3::zeros();
         for (row, column) in order.iter().enumerate() {
-            nearest[(row, *column)] = rotation[(row, *column)].signum();
+            nearest[(row, *column)] = matrix[(row, *column)].signum();
         }
-        nearest.determinant() > 0.0 && Rotation3::from_matrix_unchecked(nearest).angle_to(&rotation) < EXPLAINED_RAD
+        // By quaternions: the angle of a matrix is that of its trace, and of one that rounding has made larger than 3 it is none.
+        let nearest = Rotation3::from_matrix_unchecked(nearest);
+        nearest.matrix().determinant() > 0.0 && UnitQuaternion::from(nearest).angle_to(rotation) < EXPLAINED_RAD
     })
 }
 

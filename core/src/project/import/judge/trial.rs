@@ -211,10 +211,6 @@ impl Judge<'_> {
         let is_near = median_m < EXPLAINED * sight.distance_m && median_rad < EXPLAINED_RAD;
         let own = is_near.then(|| self.own_poses(case, sight, solution, &views)).flatten();
         let mut contradictions: Vec<String> = own.into_iter().collect();
-        if matches!(case.source, Source::Track(_)) {
-            let seen: Vec<Isometry3<f64>> = views.iter().map(|view| *view.pair.camera_from_target.isometry()).collect();
-            contradictions.extend(field_of_view::outside(&seen));
-        }
         let agrees = |sample: usize| {
             views.iter().zip(&misfits).any(|(view, (misfit_m, _))| view.sample == sample && *misfit_m <= limit)
         };
@@ -301,6 +297,26 @@ impl Judge<'_> {
             let Some((_, why)) = own.iter().find(|(track, _)| is_same(**track)) else { continue };
             if !h.contradictions.contains(why) {
                 h.contradictions.insert(0, why.clone());
+            }
+        }
+    }
+
+    /// Contradicts hypotheses that put a recorded target where no lens sees it, where another one explains the recording and does
+    /// not: a marker's frame need not be that of a lens, so that alone it says nothing.
+    pub fn contradict_outside(&self, hypotheses: &mut [Hypothesis]) {
+        let outside = |h: &Hypothesis| {
+            let case = Case::of(h);
+            let sight = self.sight_of(h.source, h.target_reading.as_ref())?;
+            let views = self.views(&case, &h.pairing, &sight);
+            let seen: Vec<Isometry3<f64>> = views.iter().map(|view| *view.pair.camera_from_target.isometry()).collect();
+            field_of_view::outside(&seen)
+        };
+        let is_recorded = |h: &Hypothesis| matches!(h.source, Source::Track(_));
+        let found: Vec<Option<String>> = hypotheses.iter().map(|h| outside(h).filter(|_| is_recorded(h))).collect();
+        let is_seen = |(h, why): (&Hypothesis, &Option<String>)| is_recorded(h) && h.explains() && why.is_none();
+        if hypotheses.iter().zip(&found).any(is_seen) {
+            for (h, why) in hypotheses.iter_mut().zip(found) {
+                h.contradictions.extend(why);
             }
         }
     }
