@@ -21,6 +21,7 @@ pub struct Stopping {
 impl App {
     /// The arm was told to stop. Whether it did is for its states to say.
     pub(crate) fn watch_stop(&mut self) {
+        self.model.stop_pending = true;
         self.model.stopping = Some(Stopping { since_s: self.model.now_s, watch: RestWatch::default() });
         if let Some(robot) = self.model.robot.clone() {
             self.stop_seen(&robot);

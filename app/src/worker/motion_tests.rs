@@ -286,7 +286,7 @@ fn a_window_that_falls_silent_lets_the_arm_go() {
     begun(&cell, 1);
     bench.set_clock(HELD_S + 0.01);
     let why = bench.jog_ended().expect("a reason");
-    assert!(why.contains("nothing was heard of the button for 0.3 s"), "{why}");
+    assert!(why.contains("no signal from the jog button for 0.3 s"), "{why}");
 }
 
 #[test]

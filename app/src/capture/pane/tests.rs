@@ -10,7 +10,7 @@ use super::*;
 use crate::gui::testing::pane_harness::{PaneHarness, PaneState};
 use crate::gui::testing::sample;
 use crate::guided::state::{GuidedProgress, Waits};
-use crate::model::{CaptureRefused, RefusalKind, StopOutcome};
+use crate::model::{CaptureRefused, Goal, RefusalKind, StopOutcome};
 use crate::text::{Language, Text};
 
 fn pane(model: Model) -> PaneHarness {
@@ -193,6 +193,8 @@ fn remarks_are_in_view_however_narrow_the_pane_is_and_what_has_no_room_is_under_
     for (width, height, rows, hides) in [(379.0, 246.0, 3, true), (260.0, 320.0, 3, true), (900.0, 420.0, 5, false)] {
         let mut model = sample::solved();
         change(&mut model, |captures| captures[0].excluded = true);
+        // With a goal that is reached there are no buttons for more captures.
+        model.view.goal = Goal(1e-3);
         let mut pane = PaneHarness::new(model, vec2(width, height), |ui, state| {
             let PaneState { model, textures, outbox, .. } = state;
             poses_ui(ui, model, &mut textures.thumbnails, outbox);
