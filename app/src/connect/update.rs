@@ -125,7 +125,7 @@ impl App {
                 }
             }
             Err(error) => {
-                self.say(Severity::Error, text!("The connection could not be started: {error}", error = error))
+                self.say(Severity::Error, text!("The connection could not be started: {error}", error = error));
             }
         }
         self.model.source = source;

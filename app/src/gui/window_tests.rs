@@ -323,8 +323,9 @@ fn the_robot_is_grey_with_its_age_in_every_pane_once_it_is_not_read_any_more() {
 /// One press, one thing.
 #[test]
 fn esc_stops_what_is_under_way_and_leaves_open_what_is_open() {
+    type Open<'a> = (&'a str, &'a dyn Fn(&mut Silent));
     let mut silent = Silent::live();
-    let opened: [(&str, &dyn Fn(&mut Silent)); 3] = [
+    let opened: [Open<'_>; 3] = [
         ("New session…", &|silent| silent.click("Menu")),
         ("Esc stops the arm at any time", &|silent| silent.command(Command::SetDialog(Some(Dialog::Help)))),
         ("Type a command", &|silent| silent.command(Command::SetDialog(Some(Dialog::Palette)))),

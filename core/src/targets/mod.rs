@@ -168,8 +168,11 @@ impl TargetSpec {
             Self::Circles(grid) if grid.columns == grid.rows => every,
             Self::Circles(_) => half,
             Self::AsymmetricCircles(grid) if grid.rows.is_multiple_of(2) => half,
-            Self::Chessboard(_) | Self::AsymmetricCircles(_) => &[],
-            Self::Charuco(_) | Self::AprilGrid(_) | Self::AprilTag(_) => &[],
+            Self::Chessboard(_)
+            | Self::AsymmetricCircles(_)
+            | Self::Charuco(_)
+            | Self::AprilGrid(_)
+            | Self::AprilTag(_) => &[],
         }
     }
 

@@ -154,27 +154,27 @@ impl Session {
             distortion: Distortion::BrownConrady([k1, k2, p1, p2, k3]),
             ..Intrinsics::pinhole(SIZE.0, SIZE.1, fx)
         };
-        self.observed(Some(self.mode), CameraKnowledge::Fixed(given), self.views.clone())
+        Self::observed(Some(self.mode), CameraKnowledge::Fixed(given), self.views.clone())
     }
 
     /// With the lens to be estimated.
     pub fn unknown(&self) -> Observations {
-        self.observed(Some(self.mode), CameraKnowledge::NOTHING, self.views.clone())
+        Self::observed(Some(self.mode), CameraKnowledge::NOTHING, self.views.clone())
     }
 
     /// What the camera saw, without a robot.
     pub fn alone(&self) -> Observations {
         let without = |view: &ObservedView| ObservedView { base_from_tip: None, ..view.clone() };
-        self.observed(None, CameraKnowledge::NOTHING, self.views.iter().map(without).collect())
+        Self::observed(None, CameraKnowledge::NOTHING, self.views.iter().map(without).collect())
     }
 
     /// Both halves of a session whose lens is to be estimated: the views before the middle and those after it.
     pub fn halves(&self) -> [Observations; 2] {
         let (first, second) = self.views.split_at(self.views.len() / 2);
-        [first, second].map(|views| self.observed(Some(self.mode), CameraKnowledge::NOTHING, views.to_vec()))
+        [first, second].map(|views| Self::observed(Some(self.mode), CameraKnowledge::NOTHING, views.to_vec()))
     }
 
-    fn observed(&self, mode: Option<Mode>, camera: CameraKnowledge, views: Vec<ObservedView>) -> Observations {
+    fn observed(mode: Option<Mode>, camera: CameraKnowledge, views: Vec<ObservedView>) -> Observations {
         let target = TargetSpec::Chessboard(Grid { columns: COLUMNS, rows: ROWS, square_m: SQUARE_M });
         Observations { mode, target, image_size: SIZE, camera, views }
     }

@@ -49,7 +49,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
                 sequence::visits_ui(ui, model, sequence, outbox);
             }
         }
-        if !model.sequence_runs || !model.sequence.as_ref().is_some_and(|sequence| sequence.guided.is_some()) {
+        if !model.sequence_runs || model.sequence.as_ref().is_none_or(|sequence| sequence.guided.is_none()) {
             asked_ui(ui, model, outbox);
         }
     });

@@ -389,14 +389,14 @@ fn what_moves_the_arm_keeps_its_place_whatever_is_said() {
     let mut lost = sample::connected();
     lost.mover = LinkState::Failed { why: Text::verbatim("the cable is out") };
     for (what, model) in [
-        ("a refusal", says("Joint 2 would leave its range", Severity::Warning)),
-        ("a long refusal", says(&long, Severity::Error)),
-        ("an arm without kinematics", unknown_arm),
-        ("an old reading", old),
-        ("a sequence", sequence),
-        ("a connection that is lost", lost),
+        ("a refusal", Box::new(says("Joint 2 would leave its range", Severity::Warning))),
+        ("a long refusal", Box::new(says(&long, Severity::Error))),
+        ("an arm without kinematics", Box::new(unknown_arm)),
+        ("an old reading", Box::new(old)),
+        ("a sequence", Box::new(sequence)),
+        ("a connection that is lost", Box::new(lost)),
     ] {
-        assert_eq!(places(model), before, "{what}");
+        assert_eq!(places(*model), before, "{what}");
     }
 }
 

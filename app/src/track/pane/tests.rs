@@ -228,8 +228,8 @@ fn a_cell_that_does_not_say_where_its_board_is_has_no_controls_for_it() {
 
 #[test]
 fn nothing_is_wider_than_the_tile() {
-    for model in [tracked(), sample::tracking(), sample::captured()] {
-        assert!(driven(model).nothing_is_cut_off());
+    for model in [tracked, sample::tracking, sample::captured] {
+        assert!(driven(model()).nothing_is_cut_off());
     }
 }
 

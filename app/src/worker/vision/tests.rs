@@ -1,3 +1,4 @@
+use handeye_core::capture::NO_IMAGES_S;
 use handeye_core::capture::Wait;
 use handeye_core::detect::VisionError;
 use handeye_core::geometry::camera::Intrinsics;
@@ -158,7 +159,7 @@ fn no_images_and_a_simulation_that_rests_are_told_apart() {
         table.turn();
         let now_s = {
             let mut now_s = table.now_s.lock().expect("no panic");
-            *now_s += 2.1;
+            *now_s += NO_IMAGES_S + 0.1;
             *now_s
         };
         if camera_answers {

@@ -226,7 +226,9 @@ fn examine(
     };
     let mut fine = words::fine(&selection);
     if let Some(calibration) = calibration.as_deref() {
-        fine.iter_mut().for_each(|h| h.applied = claim::is_applied(calibration, h));
+        for h in &mut fine {
+            h.applied = claim::is_applied(calibration, h);
+        }
     }
     let noise = calibration.as_deref().and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
     if let Some(calibration) = calibration {

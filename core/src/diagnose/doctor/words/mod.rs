@@ -241,7 +241,7 @@ fn is_a_thousand(unit: f64) -> bool {
 
 /// A factor between units of length as people write it.
 fn factor_said(unit: f64) -> String {
-    if unit >= 1.0 && unit < 30.0 {
+    if (1.0..30.0).contains(&unit) {
         format!("{unit}")
     } else if unit > 30.0 && unit < 40.0 {
         "1/0.0254".into()

@@ -98,8 +98,11 @@ fn ends_in_number(key: &str) -> bool {
     key.ends_with(|c: char| c.is_ascii_digit())
 }
 
+/// A field of a document.
+type Entry = (String, Value);
+
 /// Numbers in fields that count, `pose1` to `pose6`, as the lists that they are; and the other fields.
-fn folded(entries: &[(String, Value)]) -> (Vec<(String, Value)>, Vec<&(String, Value)>) {
+fn folded(entries: &[Entry]) -> (Vec<Entry>, Vec<&Entry>) {
     let mut by_prefix: BTreeMap<String, Vec<(u64, f64)>> = BTreeMap::new();
     for (key, inner) in entries {
         if let (Some((prefix, count)), Some(number)) = (counting_key(key), inner.number()) {

@@ -235,7 +235,9 @@ fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
         12 | 13 => {
             let first = width - 12;
             let mut second: Vec<Layout> = six(first + 6);
-            second.iter_mut().for_each(|layout| layout.joints = Some(first..first + 6));
+            for layout in &mut second {
+                layout.joints = Some(first..first + 6);
+            }
             [six(first), second].concat()
         }
         14 if counts(rows, 0) || grows(rows) => [six(2), six(8)].concat(),
@@ -243,12 +245,11 @@ fn layouts(rows: &[&[f64]]) -> Vec<Layout> {
     }
 }
 
+/// Whether most rows are such.
+type Most<'a> = dyn Fn(&dyn Fn(&[f64]) -> bool) -> bool + 'a;
+
 /// Poses that are known by their numbers, one beside the other in a row: of the robot and of the target.
-fn side_by_side(
-    width: usize,
-    most: &dyn Fn(&dyn Fn(&[f64]) -> bool) -> bool,
-    with: &dyn Fn(usize, usize, bool) -> Layout,
-) -> Vec<Layout> {
+fn side_by_side(width: usize, most: &Most<'_>, with: &dyn Fn(usize, usize, bool) -> Layout) -> Vec<Layout> {
     let mut found: Vec<Layout> = Vec::new();
     let mut first = 0;
     while first < width {

@@ -37,8 +37,7 @@ fn label(line: &Line) -> Option<(String, usize, Option<u64>)> {
 /// The groups of a table; `None` where rows have no words or one of their own each. Headers are part of every group.
 pub(super) fn groups(lines: &[Line]) -> Option<Vec<Group>> {
     let numeric = lines.iter().filter(|line| line.is_numeric());
-    let labelled: Vec<(&Line, (String, usize, Option<u64>))> =
-        numeric.clone().filter_map(|line| Some((line, label(line)?))).collect();
+    let labelled: Vec<_> = numeric.clone().filter_map(|line| Some((line, label(line)?))).collect();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for (_, (label, ..)) in &labelled {
         *counts.entry(label).or_default() += 1;

@@ -36,7 +36,7 @@ pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut Each<'_>) -> Re
                 has_begun = true;
                 let flow = match mcap::parse_record(opcode, data) {
                     // A chunk that is broken costs its own messages.
-                    Ok(Record::Chunk { header, data }) => bag.chunk(header, &data, budget),
+                    Ok(Record::Chunk { header, data }) => bag.chunk(&header, &data, budget),
                     Ok(record) => bag.record(record),
                     Err(_broken) => Flow::Continue(()),
                 };
@@ -58,7 +58,7 @@ struct Bag<'a> {
 }
 
 impl Bag<'_> {
-    fn chunk(&mut self, header: ChunkHeader, data: &[u8], budget: &Budget<'_>) -> Flow {
+    fn chunk(&mut self, header: &ChunkHeader, data: &[u8], budget: &Budget<'_>) -> Flow {
         let most = usize::try_from(header.uncompressed_size).unwrap_or(usize::MAX).min(MOST_RECORD_BYTES);
         let plain = match header.compression.as_str() {
             "" => Some(data.to_vec()),
@@ -68,8 +68,12 @@ impl Bag<'_> {
         };
         let Some(plain) = plain else { return Flow::Continue(()) };
         let length = plain.len() as u64;
-        let header =
-            ChunkHeader { compression: String::new(), compressed_size: length, uncompressed_size: length, ..header };
+        let header = ChunkHeader {
+            compression: String::new(),
+            compressed_size: length,
+            uncompressed_size: length,
+            ..header.clone()
+        };
         let Ok(records) = ChunkReader::new(header, &plain) else { return Flow::Continue(()) };
         for record in records {
             let Ok(record) = record else { break };
