@@ -169,7 +169,8 @@ fn an_xml_that_is_named_finds_its_images_below_and_is_spoken_of() {
     for view in 0..VIEWS {
         save_image(&folder.path().join(format!("pics/shot{view:02}.png")), view);
         let n = numbers(Written::RpyDegMm, &pose_of(&session, view));
-        let values: String = n.iter().enumerate().map(|(i, v)| format!("<pose{0}>{v:?}</pose{0}>", i + 1)).collect();
+        let values =
+            n.iter().enumerate().fold(String::new(), |all, (i, v)| format!("{all}<pose{0}>{v:?}</pose{0}>", i + 1));
         let _ok = writeln!(text, "<record><image>pics/shot{view:02}.png</image>{values}</record>");
     }
     fs::write(folder.path().join("log.xml"), text + "</log>\n").expect("written");
