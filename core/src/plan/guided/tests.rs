@@ -68,11 +68,6 @@ fn a_board_near_the_edge_of_the_image_is_tilted_by_a_rough_answer_until_the_lens
             run.ending,
             run.history
         );
-        eprintln!(
-            "{arm:?} {mode:?}: {tilts} tilts, {:?} {:?}",
-            run.ending,
-            run.steps.iter().map(|step| step.why).take(8).collect::<Vec<_>>()
-        );
         assert!((0..=6).contains(&tilts) && run.failed <= 2, "{arm:?} {mode:?}: {tilts} tilts, {} failed", run.failed);
     }
 }
