@@ -32,7 +32,7 @@ def pose(z):
 def state():
     message = {"type": "state", "stamp": now(), "joints_rad": [joint], "base_from_tip": pose(joint), "moving": motion is not None}
     if fault == "trembles":
-        message["joints_rad"] = [joint + random.choice([0.0, 0.001])]
+        message["joints_rad"] = [joint + random.uniform(0.0, 0.02)]
     if fault == "nan":
         message["base_from_tip"]["translation_m"][0] = float("nan")
     elif fault == "no stamp":

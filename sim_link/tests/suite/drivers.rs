@@ -390,7 +390,7 @@ const FAULTS: &[(&str, &str)] = &[
     ("degrees", "lift is at 90, outside 0 to 0.5: radians and metres are needed"),
     ("stamps back", "stamps never go back"),
     ("frozen stamps", "all have the stamp 100"),
-    ("other clock", "s after the present by the stamps of `pong`"),
+    ("other clock", "s later than this pong, which came after it"),
     ("too many joints", "2 values, where hello has 1 joints"),
     ("no pose", "nothing else says where the tip is"),
     ("no states", "has not answered with a state"),
