@@ -6,7 +6,8 @@ use handeye_core::project::session::Document;
 use rerun::log::LogMsg;
 use rerun::sink::CallbackSink;
 
-use super::super::stream::{SharedSink, Target};
+use super::super::lasting::Recording;
+use super::super::stream::{SharedSink, Stream, Target, file_sink};
 use super::*;
 use crate::model::{Severity, ViewerState};
 use crate::session::start;
@@ -65,6 +66,24 @@ fn a_recording_that_is_off_takes_entries_and_does_nothing() {
     recorder.note(said("a"));
     recorder.open(ViewerWish::Best);
     assert_eq!(recorder.state(), RerunState::default());
+}
+
+#[test]
+fn a_long_recording_holds_nothing_back_until_it_is_closed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("recording.rrd");
+    let target = Target::File { path: path.clone(), sink: file_sink(&path).expect("a sink") };
+    let recording = Recording { id: "long".to_owned(), name: "long".to_owned(), folder: None };
+    let mut stream = Stream::open(&target, &recording).expect("a stream");
+    for second in 0..300 {
+        stream.write_live(&robot(f64::from(second))).expect("written");
+        stream.flush().expect("flushed");
+    }
+    let before = std::fs::metadata(&path).expect("the file").len();
+    drop((stream, target));
+    let after = std::fs::metadata(&path).expect("the file").len();
+    assert!(after - before < 1024, "{} bytes were held for {before} bytes of 300 chunks", after - before);
+    assert!(!entities(&path).is_empty());
 }
 
 #[test]

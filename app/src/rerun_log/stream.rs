@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use rerun::log::{ChunkBatcherConfig, LogMsg};
-use rerun::sink::{FileSink, FileSinkError, LogSink, SinkFlushError};
+use rerun::sink::{FileSink, FileSinkError, FileSinkOptions, LogSink, SinkFlushError};
 use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError};
 
 use super::lasting::Recording;
@@ -93,12 +93,13 @@ pub enum OpenError {
     Stream(#[from] RecordingStreamError),
 }
 
-/// A sink into a file.
+/// A sink into a file. It holds nothing back until it is closed: the footer with a list of all chunks would be collected in
+/// memory for as long as the session lasts, and is missing anyway after a program that was ended in the middle.
 ///
 /// # Errors
 /// When it cannot be written.
 pub fn file_sink(path: &Path) -> Result<SharedSink, FileSinkError> {
-    Ok(SharedSink(Arc::new(FileSink::new(path)?)))
+    Ok(SharedSink(Arc::new(FileSink::with_options(path, FileSinkOptions { write_footer: false })?)))
 }
 
 impl Stream {
