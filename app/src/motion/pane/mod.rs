@@ -10,11 +10,12 @@ mod settings;
 mod status;
 mod typed;
 
-use egui::{ScrollArea, Ui};
+use egui::{Rect, ScrollArea, Sense, Ui, UiBuilder, Vec2};
 
 use crate::command::Outbox;
 use crate::connect::drivers::typed_pose::typed_pose_ui;
 use crate::gui::style::parts;
+use crate::gui::style::theme::Palette;
 use crate::model::{Model, Moves};
 use crate::tr;
 pub use asked::asked_ui;
@@ -22,10 +23,10 @@ use blocked::Blocked;
 pub use blocked::unknown_arm;
 use hold::Hold;
 
-/// Room \[points\] for a notice of two lines.
-const ROOM_TO_SAY: f32 = 54.0;
-/// The same with the question whether a robot may be moved, and its button.
-const ROOM_TO_ALLOW: f32 = 100.0;
+/// Room \[points\] below everything, so that no notice covers what is scrolled to the end.
+const ROOM: f32 = 100.0;
+/// Around the notices \[points\].
+const MARGIN: Vec2 = Vec2::new(12.0, 6.0);
 
 /// The pane.
 pub fn jog_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -33,33 +34,51 @@ pub fn jog_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         return parts::body_ui(ui, "jog", |ui| read_only_ui(ui, model, outbox));
     }
     let blocked = Blocked::of(model);
+    let pane = ui.max_rect();
     parts::body_ui(ui, "jog", |ui| {
         let mut hold = Hold::begin(ui);
         status::status_ui(ui, model, outbox);
-        notices_ui(ui, model, &blocked, outbox);
         settings::settings_ui(ui, model, outbox);
         pad::pad_ui(ui, model, &blocked, &mut hold);
         joints::joints_ui(ui, model, &blocked, &mut hold, outbox);
         status::tip_ui(ui, model);
         typed::typed_ui(ui, model, &blocked, outbox);
         hold.finish(ui, outbox);
+        ui.add_space(ROOM);
+    });
+    notices_ui(ui, pane, |ui| {
+        status::refusal_ui(ui, model, outbox);
+        blocked.arm_ui(ui, model, outbox);
+        blocked.tip_ui(ui);
+        allowance::allowance_ui(ui, model, outbox);
     });
 }
 
-/// What is in the way, was refused, or has to be allowed. It has its room also while there is nothing to say: what moves the
-/// arm does not change its place under the pointer. Longer words are scrolled.
-fn notices_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbox) {
-    let height = if matches!(model.moves(), Moves::OnceArmed { .. }) { ROOM_TO_ALLOW } else { ROOM_TO_SAY };
-    let size = egui::vec2(ui.available_width(), height);
-    ui.allocate_ui(size, |ui| {
-        ui.set_min_size(size);
-        ScrollArea::vertical().id_salt("notices").max_height(height).auto_shrink(false).show(ui, |ui| {
-            status::refusal_ui(ui, model, outbox);
-            blocked.arm_ui(ui, model, outbox);
-            blocked.tip_ui(ui);
-            allowance::allowance_ui(ui, model, outbox);
-        });
-    });
+/// What is in the way, was refused, or has to be allowed: over the lower end of the pane, so that nothing that moves the arm
+/// changes its place under the pointer. Longer words are scrolled.
+fn notices_ui(ui: &mut Ui, pane: Rect, content_ui: impl FnOnce(&mut Ui)) {
+    let id = ui.id().with("notices");
+    let height: f32 = ui.data(|data| data.get_temp(id)).unwrap_or_default();
+    let place = pane.with_min_y(pane.bottom() - height.min(0.5 * pane.height()));
+    if height > 0.0 {
+        ui.painter().rect_filled(place, 0.0, Palette::of(ui).card);
+        // What is covered cannot be pressed.
+        ui.interact(place, id.with("cover"), Sense::click_and_drag());
+    }
+    let inside = place.shrink2(MARGIN);
+    let mut ui = ui.new_child(UiBuilder::new().max_rect(inside));
+    let notices = ScrollArea::vertical()
+        .id_salt("notices")
+        .max_height(inside.height().max(0.0))
+        .min_scrolled_height(0.0)
+        .auto_shrink(false)
+        .show(&mut ui, content_ui);
+    let content = notices.content_size.y;
+    let wanted = if content > 0.0 { content + 2.0 * MARGIN.y } else { 0.0 };
+    if (wanted - height).abs() > 0.5 {
+        ui.data_mut(|data| data.insert_temp(id, wanted));
+        ui.ctx().request_discard("a notice of another height");
+    }
 }
 
 /// A robot that is only read.
