@@ -241,6 +241,8 @@ pub enum Command {
     NewSession(Option<PathBuf>),
     /// Go on with a session, or copy a data set into one.
     Open(PathBuf),
+    /// Copy the recorded sample that comes with the program into a session.
+    OpenSample,
     /// Go on with a complete copy in another folder.
     SaveAs(PathBuf),
     /// Read the folders in a folder.

@@ -22,6 +22,7 @@ pub mod motion;
 pub mod observe;
 mod report;
 pub mod rerun_log;
+mod sample;
 mod scene;
 pub mod serve;
 pub mod session;

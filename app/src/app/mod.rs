@@ -269,6 +269,7 @@ impl App {
             Command::SetCamera(camera) => self.set_camera(camera),
             Command::NewSession(folder) => self.new_session(folder),
             Command::Open(folder) => self.open(folder),
+            Command::OpenSample => self.open_sample(),
             Command::SetImportTarget(typed) => self.set_import_target(typed),
             Command::SetImportTime(seconds) => self.set_import_time(seconds),
             Command::FixConvention { key, value } => self.fix_convention(key, value),

@@ -7,14 +7,16 @@ use handeye_core::estimate::{Method, Options};
 
 use super::gate::{self, Gate};
 use super::output::Output;
-use super::{Failure, RerunArg, rerun_arg, shared, solve};
+use super::{Failure, RerunArg, heading, rerun_arg, shared, solve};
 use crate::model::Goal;
 use crate::rerun_log::{Pace, RerunChoice};
 
 /// At the end of its help.
-pub const EXAMPLES: &str = "Example:
+pub const EXAMPLES: &str = "Examples:
+  handeye sample --out my_robot_images
   handeye calibrate my_robot_images --json result.json
-  handeye calibrate monday tuesday wednesday --share-intrinsics --out results";
+  handeye auto --scene realistic --out realistic
+  handeye calibrate my_robot_images realistic --share-intrinsics --out results";
 
 /// Options of `handeye calibrate`.
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
@@ -25,29 +27,29 @@ pub struct CalibrateArgs {
     paths: Vec<PathBuf>,
     /// Calibrate sessions of one camera together: one lens for all of them, links and noise levels of each. There is a
     /// result for every folder, and `--json` writes an array of them.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::ESTIMATE)]
     share_intrinsics: bool,
     /// Write the result as JSON to this file; `-` for standard output instead of the report.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
     /// Which answer: the joint estimate, or one closed form.
-    #[arg(long, value_name = "NAME", default_value = "joint", value_parser = Method::names())]
+    #[arg(long, value_name = "NAME", default_value = "joint", value_parser = Method::names(), help_heading = heading::ESTIMATE)]
     method: String,
     /// Write the result and its exports into this folder; of several sessions into a folder each in it, by their names.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Keep views and corners that do not fit the others; without it they are left out as outliers and named.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::ESTIMATE)]
     keep_outliers: bool,
     /// Estimate the true size of the target, which the robot's translations tell.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::ESTIMATE)]
     free_scale: bool,
     /// Try constant offsets of the robot's joints, and take them when views held out say so. Needs joint angles.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::ESTIMATE)]
     joint_offsets: bool,
     /// End with exit code 1 unless a number of the result is below a limit, such as `tip_error_95_mm<0.5`. A finding that
     /// is a problem ends with it too, whatever the numbers.
-    #[arg(long, value_name = "NAME<LIMIT")]
+    #[arg(long, value_name = "NAME<LIMIT", help_heading = heading::OUTPUT)]
     gate: Vec<Gate>,
     #[command(flatten)]
     rerun: RerunArg,

@@ -6,42 +6,42 @@ use clap::Args;
 use handeye_sim_link::cell::scene::{BoardPath, Scene, SceneChoice};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 
-use super::{Failure, out, solve};
+use super::{Failure, heading, out, solve};
 
 /// Options of `handeye cell`.
 #[derive(Debug, Args)]
 pub struct CellArgs {
     /// Address of the network interface to serve on. Whoever can connect can move the arm: there is no password.
-    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1")]
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1", help_heading = heading::ACCESS)]
     bind: String,
     /// Port; 0 picks one that is free.
-    #[arg(long, value_name = "PORT", default_value_t = 23000)]
+    #[arg(long, value_name = "PORT", default_value_t = 23000, help_heading = heading::ACCESS)]
     port: u16,
     /// Seed of everything random in the cell; the scene's own if not given.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::CELL)]
     seed: Option<u64>,
     #[command(flatten)]
     scene: SceneArg,
     /// Let simulated time run as fast as it can instead of like real time.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::CELL)]
     fast: bool,
     /// Have the board move: still, circle, figure_eight, random_walk or step; as the scene says if not given.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", help_heading = heading::BOARD)]
     board_path: Option<BoardPath>,
     /// Mean speed of the board in m/s; as the scene says if not given.
-    #[arg(long, value_name = "SPEED")]
+    #[arg(long, value_name = "SPEED", help_heading = heading::BOARD)]
     board_speed: Option<f64>,
     /// How far the path of the board reaches in m; as the scene says if not given.
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", help_heading = heading::BOARD)]
     board_size: Option<f64>,
     /// Largest angle in degrees by which the board is turned on its way; as the scene says if not given.
-    #[arg(long, value_name = "ANGLE")]
+    #[arg(long, value_name = "ANGLE", help_heading = heading::BOARD)]
     board_tilt: Option<f64>,
     /// Simulated time from image to image in s; as the scene says if not given.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", help_heading = heading::CELL)]
     time_step: Option<f64>,
     /// Leave out the functions that CoppeliaSim does not have (`handeye.*`), to try a program as it runs there.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::CELL)]
     coppeliasim_only: bool,
 }
 
@@ -65,7 +65,7 @@ impl CellArgs {
 pub struct SceneArg {
     /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, tracking, panda, xarm6; the
     /// reference scene if not given.
-    #[arg(long, value_name = "FILE|NAME")]
+    #[arg(long, value_name = "FILE|NAME", help_heading = heading::CELL)]
     scene: Option<SceneChoice>,
 }
 

@@ -9,7 +9,7 @@ use handeye_core::estimate::handeye::HandEyeError;
 use handeye_core::estimate::{CalibrateError, Method, calibrate};
 
 use super::output::Output;
-use super::{Failure, out, solve};
+use super::{Failure, heading, out, solve};
 
 /// Options of `handeye doctor`.
 #[derive(Debug, Args)]
@@ -17,13 +17,13 @@ pub struct DoctorArgs {
     /// Session or dataset folder: images, a pose table and dataset.toml.
     path: PathBuf,
     /// Write the diagnosis as JSON to this file; `-` for standard output instead of the report.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
     /// The expected error to reach, millimetres (95 %).
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", help_heading = heading::ESTIMATE)]
     goal: Option<f64>,
     /// List every hypothesis that was tested, with what it explains.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::OUTPUT)]
     all: bool,
 }
 

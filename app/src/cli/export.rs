@@ -9,10 +9,16 @@ use handeye_core::project::export::{self, CameraLink, ExportError, ExportInput, 
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::{CaptureRecord, Session};
 
-use super::{Failure, out, solve};
+use super::{Failure, heading, out, solve};
 
 /// What `calibrate --out` and `export --format json` call the result.
 const EXPORTED_RESULT: &str = "calibration.json";
+
+/// At the end of its help.
+pub const EXAMPLES: &str = "Examples:
+  handeye sample --out my_robot_images
+  handeye calibrate my_robot_images --json result.json
+  handeye export result.json --format ros_camera_info easy_handeye2 --out files";
 
 /// Options of `handeye export`.
 #[derive(Debug, Args)]
@@ -20,33 +26,33 @@ pub struct ExportArgs {
     /// Solved session or dataset (a folder with result.json or calibration.json), or a result JSON.
     path: PathBuf,
     /// Formats to write.
-    #[arg(long, required = true, num_args = 1.., value_name = "NAME", value_parser = format_names())]
+    #[arg(long, required = true, num_args = 1.., value_name = "NAME", value_parser = format_names(), help_heading = heading::OUTPUT)]
     format: Vec<String>,
     /// Folder to write into.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: PathBuf,
     /// Name of the calibration in the files.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = heading::NAMES)]
     name: Option<String>,
     /// Name of the camera in the files.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = heading::NAMES)]
     camera_name: Option<String>,
     /// Name of the robot's base frame in the files.
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", help_heading = heading::NAMES)]
     base_frame: Option<String>,
     /// Name of the robot's tip frame in the files.
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", help_heading = heading::NAMES)]
     effector_frame: Option<String>,
     /// Name of the camera's optical frame in the files.
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", help_heading = heading::NAMES)]
     camera_frame: Option<String>,
     /// Name of the target's frame in the files.
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", help_heading = heading::NAMES)]
     target_frame: Option<String>,
     /// Publish where this body frame of the camera is, not the optical frame: for cameras whose driver publishes the
     /// optical frame itself. The numbers are the optical frame in the body: its origin in metres, and its rotation
     /// where it is not that of ROS REP 103.
-    #[arg(long, value_name = "FRAME[:X,Y,Z[,QX,QY,QZ,QW]]", value_parser = camera_link)]
+    #[arg(long, value_name = "FRAME[:X,Y,Z[,QX,QY,QZ,QW]]", value_parser = camera_link, help_heading = heading::NAMES)]
     camera_link: Option<CameraLink>,
 }
 

@@ -17,15 +17,16 @@ use handeye_core::wording::English;
 use serde_json::json;
 
 use super::output::Output;
-use super::{Failure, out, solve, target};
+use super::{Failure, heading, out, solve, target};
 use crate::import::understand::{self, NotUnderstood};
 
 /// At the end of its help.
 pub fn after_help() -> String {
     format!(
-        "Keys of --set:\n{}\n\nExample:\n  handeye import recording --target 11x8x20\n  handeye import recording --target 11x8x20 \
-         --set mode=eye_in_hand --out my_robot_images\n  handeye import recording --target \
-         kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250 --take best --out my_robot_images",
+        "Keys of --set:\n{}\n\nExamples, on a recording without a description of what its files mean:\n  \
+         handeye sample --out recording && rm recording/dataset.toml\n  \
+         handeye import recording --target 10x7x15 --set mode=eye_in_hand\n  \
+         handeye import recording --target 10x7x15 --set mode=eye_in_hand \\\n      --out my_robot_images",
         import::KEYS
     )
 }
@@ -36,30 +37,30 @@ pub struct ImportArgs {
     /// Folder or file of the recording.
     path: PathBuf,
     /// Write a dataset folder here; it must not be there yet, or be empty. Without it the hypotheses are only listed.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// What was looked at: 10x7x15 is a chessboard of 10 × 7 inner corners with squares of 15 mm; others as `handeye target`
     /// names them, kind=charuco,columns=4,rows=6,square=33,marker=20,dictionary=6x6_250.
-    #[arg(long, value_name = "SPEC")]
+    #[arg(long, value_name = "SPEC", help_heading = heading::MEANING)]
     target: Option<String>,
     /// Take one of several hypotheses that explain the recording: `best` for the first, or its number in the list.
-    #[arg(long, value_name = "best|N")]
+    #[arg(long, value_name = "best|N", help_heading = heading::MEANING)]
     take: Option<Take>,
     /// Fix a convention that the files do not state; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", help_heading = heading::MEANING)]
     set: Vec<String>,
     /// Leave the images where they are; the data set names them there.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::OUTPUT)]
     link: bool,
     /// Stop reading the files after so many seconds. Looking at images takes no part of it: its progress is said, and Ctrl-C
     /// ends it.
-    #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = seconds, help_heading = heading::LIMITS)]
     time: f64,
     /// Stop reading where compressed files unpack to more than so many GiB.
-    #[arg(long, value_name = "GIB", default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    #[arg(long, value_name = "GIB", default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..=1 << 20), help_heading = heading::LIMITS)]
     unpack: u64,
     /// Write what was found as JSON to this file; `-` for standard output instead of the text.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
 }
 

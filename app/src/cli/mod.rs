@@ -13,6 +13,9 @@ mod driver;
 mod export;
 mod failure;
 mod gate;
+pub(crate) mod heading;
+#[cfg(test)]
+mod help_tests;
 mod import;
 mod late;
 mod object_arg;
@@ -21,6 +24,7 @@ mod output;
 mod plan;
 mod record;
 pub mod rerun_arg;
+mod sample;
 mod shared;
 mod solve;
 pub(crate) mod target;
@@ -39,9 +43,16 @@ pub use failure::Failure;
 pub use object_arg::ObjectArgs;
 pub use rerun_arg::RerunArg;
 
+/// The least that is to be known.
+const EXAMPLES: &str = "Examples, the first of which opens the window:
+  handeye
+  handeye sample --out my_robot_images
+  handeye calibrate my_robot_images --json result.json
+  handeye auto --help";
+
 /// Calibrates a robot's camera: live in a window, or from the command line.
 #[derive(Debug, Parser)]
-#[command(name = "handeye", version, about, max_term_width = 100)]
+#[command(name = "handeye", version, max_term_width = 100, after_help = EXAMPLES)]
 struct Cli {
     /// Say nothing but results and errors.
     #[arg(long, short, global = true)]
@@ -53,37 +64,44 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Open the workbench (the default).
-    #[command(after_help = "Example:\n  handeye gui --connect tcp://192.168.0.7:23000")]
+    #[command(after_help = "Examples:\n  handeye gui --scene panda\n  handeye gui --connect tcp://192.168.0.7:23000")]
     Gui(GuiArgs),
     /// Show the workbench in a browser, here or on another machine, until Ctrl-C (docs/browser.md).
     #[command(after_help = "Examples:\n  handeye serve\n  handeye serve --bind 0.0.0.0 --port 8600")]
     Serve(ServeArgs),
     /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.
-    #[command(after_help = "Example:\n  handeye cell --port 0 --scene assets/scenes/realistic.toml --seed 7")]
+    #[command(after_help = "Examples:\n  handeye cell --port 0 --scene realistic --seed 7")]
     Cell(cell::CellArgs),
     /// Drive the robot through poses, capture, solve, and write a session with its exports.
-    #[command(after_help = "Example:\n  handeye auto --poses seed10 --out session --json result.json")]
+    #[command(after_help = auto::EXAMPLES)]
     Auto(auto::AutoArgs),
     /// Solve a session or a dataset folder, or several of one camera together.
     #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::CalibrateArgs),
+    /// Write the recorded sample that comes with the program as a dataset folder, to try the other commands on.
+    #[command(after_help = sample::EXAMPLES)]
+    Sample(sample::SampleArgs),
     /// Say what is wrong with a session or a dataset folder, and what to do about it.
-    #[command(after_help = "Example:\n  handeye doctor my_robot_images --json diagnosis.json")]
+    #[command(
+        after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye doctor my_robot_images --json diagnosis.json"
+    )]
     Doctor(doctor::DoctorArgs),
     /// Say which poses would lower the expected error of a session or a dataset folder most.
-    #[command(after_help = "Example:\n  handeye plan my_robot_images --count 5 --json plan.json")]
+    #[command(
+        after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye plan my_robot_images --count 5 --json plan.json"
+    )]
     Plan(plan::PlanArgs),
     /// Track the board live with a calibration, and have the arm follow it.
-    #[command(after_help = "Example:\n  handeye track --calibration session/result.json --follow --frames 600")]
+    #[command(after_help = track::EXAMPLES)]
     Track(track::TrackArgs),
     /// Try a driver, or be one: a program between the workbench and any robot or camera (docs/drivers.md).
     #[command(after_help = driver::EXAMPLES)]
     Driver(driver::DriverArgs),
     /// Turn somebody's recording into a dataset folder: images with a table, a file to a pose, what other tools write.
-    #[command(after_help = import::after_help())]
+    #[command(after_help = import::after_help(), next_line_help = true)]
     Import(import::ImportArgs),
     /// Write calibration files from a solved session or a result JSON.
-    #[command(after_help = "Example:\n  handeye export session --format ros_camera_info easy_handeye2 --out files")]
+    #[command(after_help = export::EXAMPLES)]
     Export(export::ExportArgs),
     /// Print a target as a PDF at exact physical scale, with rulers to check the print.
     #[command(after_help = target::EXAMPLES)]
@@ -131,6 +149,7 @@ pub fn main() -> ExitCode {
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Sample(args) => sample::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Track(args) => track::run(&args),

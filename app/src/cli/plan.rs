@@ -13,7 +13,7 @@ use handeye_core::plan::guided::{Guide, GuidedOptions, Known, Next, Why};
 use serde::Serialize;
 
 use super::output::Output;
-use super::{Failure, box_arg, out, solve};
+use super::{Failure, box_arg, heading, out, solve};
 
 /// Options of `handeye plan`.
 #[derive(Debug, Args)]
@@ -21,17 +21,17 @@ pub struct PlanArgs {
     /// Session or dataset folder: images, a pose table and dataset.toml.
     path: PathBuf,
     /// How many poses to propose.
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=50))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=50), help_heading = heading::POSES)]
     count: u32,
     /// Seed of the views at random that are compared.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = heading::POSES)]
     seed: u64,
     /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. Errors are then those of
     /// the worst point of it; without it those where the camera saw the board.
-    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true, help_heading = heading::POSES)]
     tool_box: Option<TipBox>,
     /// Write the poses as JSON to this file; `-` for standard output instead of the table.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
 }
 

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use clap::Args;
 use handeye_core::progress::CancelToken;
 
-use super::{Failure, out};
+use super::{Failure, heading, out};
 use crate::model::ViewerState;
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice, WebViewer};
 use crate::text::Language;
@@ -24,7 +24,7 @@ pub struct RerunArg {
     /// Show it in Rerun: in the native viewer (spawn), in a browser (web), or in a viewer that runs (connect URL); or
     /// record it into a file (save FILE), or not at all (off).
     // One value: the second word is joined to the first before anything is parsed, see `joined`.
-    #[arg(long, value_name = "spawn|web|connect URL|save FILE|off", value_parser = RerunChoice::parse)]
+    #[arg(long, value_name = "spawn|web|connect URL|save FILE|off", value_parser = RerunChoice::parse, help_heading = heading::OUTPUT)]
     rerun: Option<RerunChoice>,
 }
 

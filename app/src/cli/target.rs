@@ -7,12 +7,15 @@ use handeye_core::targets::print::{Page, PrintError, Sheet, pdf};
 use handeye_core::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
 
 use super::output::Output;
-use super::{Failure, out};
+use super::{Failure, heading, out};
 
-pub const EXAMPLES: &str = "Example:
-  handeye target --kind charuco --columns 6 --rows 8 --square 22 --marker 16 --dictionary 5x5_100 --pdf board.pdf
-  handeye target --kind aprilgrid --columns 4 --rows 6 --tag 30 --spacing 9 --family apriltag_36h11 --pdf grid.pdf
-  handeye target --kind chessboard --columns 10 --rows 7 --square 40 --page fit --pdf board.pdf";
+pub const EXAMPLES: &str = "Examples:
+  handeye target --kind charuco --columns 6 --rows 8 --square 22 \\
+      --marker 16 --dictionary 5x5_100 --pdf charuco.pdf
+  handeye target --kind aprilgrid --columns 4 --rows 6 --tag 30 \\
+      --spacing 9 --family apriltag_36h11 --pdf grid.pdf
+  handeye target --kind chessboard --columns 10 --rows 7 --square 40 \\
+      --page fit --pdf board.pdf";
 
 /// Options of `handeye target`.
 #[derive(Debug, Args)]
@@ -20,10 +23,10 @@ pub struct TargetArgs {
     #[command(flatten)]
     target: DescribedTarget,
     /// File to write; `-` for standard output.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pdf: Output,
     /// Page: a4, a3, letter, or fit for one as large as the target needs.
-    #[arg(long, value_name = "PAGE", default_value = "a4")]
+    #[arg(long, value_name = "PAGE", default_value = "a4", help_heading = heading::OUTPUT)]
     page: Page,
 }
 
@@ -31,43 +34,43 @@ pub struct TargetArgs {
 #[derive(Debug, Args)]
 struct DescribedTarget {
     /// What it is.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = heading::TARGET)]
     kind: Kind,
     /// Inner corners, dots or tags along x.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::TARGET)]
     columns: Option<usize>,
     /// Inner corners, dots or tags along y.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::TARGET)]
     rows: Option<usize>,
     /// Side of a square, distance of dots, or distance of the rows of asymmetric dots.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", help_heading = heading::TARGET)]
     square: Option<f64>,
     /// Side of a marker of a ChArUco board, with its black border.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", help_heading = heading::TARGET)]
     marker: Option<f64>,
     /// Family of the markers of a ChArUco board, such as 5x5_100.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = heading::TARGET)]
     dictionary: Option<Dictionary>,
-    /// Which squares of a ChArUco board have markers.
-    #[arg(long, value_enum)]
+    /// Which squares of a ChArUco board have markers: those of OpenCV from 4.6 on (new), or of OpenCV before (legacy).
+    #[arg(long, value_enum, help_heading = heading::TARGET)]
     layout: Option<LayoutName>,
     /// Side of a tag, with its black border.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", help_heading = heading::TAGS)]
     tag: Option<f64>,
     /// Gap between tags.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", help_heading = heading::TAGS)]
     spacing: Option<f64>,
     /// Number of the first tag of a board of tags [default: 0].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::TAGS)]
     first_id: Option<usize>,
     /// Number of a single tag [default: 0].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::TAGS)]
     id: Option<usize>,
     /// Family of tags [default: apriltag_36h11].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = heading::TAGS)]
     family: Option<Dictionary>,
     /// Width of the black border of tags in bits [default: 2 on boards, as Kalibr has it, 1 for a single tag].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::TAGS)]
     border_bits: Option<usize>,
 }
 
@@ -88,9 +91,7 @@ enum Kind {
 /// Layouts of ChArUco boards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LayoutName {
-    /// OpenCV from 4.6 on.
     New,
-    /// OpenCV before 4.6.
     Legacy,
 }
 

@@ -231,6 +231,7 @@ fn session(model: &Model, language: Language) -> Vec<Action> {
         with(tr!(language, "Redo"), REDO, Command::Redo, facts.redo.is_some()),
         dialog(tr!(language, "New session…"), NEW, Dialog::New),
         dialog(tr!(language, "Open session…"), OPEN, Dialog::Open),
+        with(tr!(language, "Open a sample"), &[], Command::OpenSample, !model.opening && !model.sequence_runs),
         dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveAs),
     ]
 }

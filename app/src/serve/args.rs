@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::cli::heading;
 use crate::gui::GuiArgs;
 
 /// Options of the workbench in a browser.
@@ -12,13 +13,13 @@ use crate::gui::GuiArgs;
 pub struct ServeArgs {
     /// Address of this machine to listen at. With any but 127.0.0.1 the address that is printed has a key in it, without
     /// which nobody is let in.
-    #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = heading::ACCESS)]
     pub bind: IpAddr,
     /// Port to listen at; 0 takes a free one.
-    #[arg(long, default_value_t = 8600)]
+    #[arg(long, default_value_t = 8600, help_heading = heading::ACCESS)]
     pub port: u16,
     /// A further folder that may be read and written from a browser, besides that of the sessions; can be repeated.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::ACCESS)]
     pub allow: Vec<PathBuf>,
     /// As for the window.
     #[command(flatten)]

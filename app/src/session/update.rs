@@ -116,6 +116,12 @@ impl App {
         self.ask_archive(ArchiveTask::Open { folder, bounds });
     }
 
+    /// A copy of the sample in a session of its own.
+    pub(crate) fn open_sample(&mut self) {
+        self.model.opening = true;
+        self.ask_archive(ArchiveTask::Sample);
+    }
+
     /// Goes on with the session in a folder, or begins one there.
     pub(crate) fn open_or_begin(&mut self, folder: PathBuf) {
         self.model.opening = true;

@@ -54,18 +54,6 @@ distortion = []
 }
 
 #[test]
-fn every_subcommand_has_help_with_an_example() {
-    for command in
-        ["gui", "cell", "auto", "calibrate", "doctor", "driver", "plan", "track", "export", "import", "target"]
-    {
-        let output = handeye(&[command, "--help"]);
-        assert_eq!(output.status.code(), Some(0));
-        assert!(text(&output.stdout).contains("Example:\n  handeye "), "{command}");
-        assert!(text(&output.stdout).contains("--quiet"), "{command}");
-    }
-}
-
-#[test]
 fn a_target_is_printed_and_described_for_a_data_set() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("board.pdf");

@@ -33,10 +33,12 @@ mod slow {
     mod leaving;
     mod many_sessions;
     mod official_client;
+    mod pasted;
     mod python_module;
     mod rerun_recording;
     mod rerun_viewers;
     mod robots;
+    mod sample;
     mod served;
     mod stops;
     mod tracking;

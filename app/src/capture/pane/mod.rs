@@ -29,6 +29,8 @@ use crate::{text, tr};
 const MOST_FRAMES: u32 = 64;
 /// A lower pane has lower buttons and rows, so that there is room for some.
 const LOW: f32 = 300.0;
+/// Height of what stands in place of the table, in the narrowest pane of a window of 1024 × 700.
+const NOTHING_YET: f32 = 130.0;
 /// Height of the line at the bottom that says how captures go.
 const STATUS: f32 = 36.0;
 
@@ -74,13 +76,31 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
                  to move it yourself. Or press Space at ten poses with the board tilted and turned to all sides."
             );
             let detail = if model.takes_chosen_poses() { by_itself } else { by_hand };
-            marks::nothing_yet_ui(ui, tr!(language, "No captures yet"), detail);
+            let title = tr!(language, "No captures yet");
+            marks::nothing_yet_but_ui(ui, title, detail, NOTHING_YET, |ui| sample_ui(ui, model, outbox));
         } else {
             table::table_ui(ui, model, &table, row, thumbnails, outbox);
         }
     });
     if has_status {
         ui.scope_builder(egui::UiBuilder::new().max_rect(below).id_salt("status"), |ui| status_ui(ui, model, outbox));
+    }
+}
+
+/// Something to look at before anything was captured.
+fn sample_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    if model.sequence_runs || model.by_hand.is_some() || model.capture.is_some() {
+        return;
+    }
+    let language = model.view.language;
+    ui.add_space(8.0);
+    let what = tr!(
+        language,
+        "Twelve photographs of a board and the robot's poses, which come with the program: copied into a session of their own"
+    );
+    let button = ui.add_enabled(!model.opening, Button::new(tr!(language, "Open a sample")));
+    if button.on_hover_text(what).clicked() {
+        outbox.send(Command::OpenSample);
     }
 }
 

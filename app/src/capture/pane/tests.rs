@@ -61,6 +61,7 @@ fn ids(numbers: &[u32]) -> Vec<CaptureId> {
 fn an_empty_session_says_what_to_do_and_captures() {
     let mut pane = pane(sample::connected());
     assert!(pane.sees("No captures yet") && pane.sees("press Space"));
+    assert_eq!(pane.click("Open a sample"), [Command::OpenSample]);
     assert_eq!(pane.click("Capture"), [Command::Capture(CapturePurpose::Calibrate)]);
     assert_eq!(pane.click("Capture for verification"), [Command::Capture(CapturePurpose::Verify)]);
     pane.model().camera = crate::model::LinkState::Failed { why: Text::verbatim("gone") };

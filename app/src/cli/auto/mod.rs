@@ -20,7 +20,7 @@ use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
 use super::output::Output;
-use super::{Failure, ObjectArgs, RerunArg, arm_arg, box_arg, out, record, rerun_arg, solve};
+use super::{Failure, ObjectArgs, RerunArg, arm_arg, box_arg, heading, out, record, rerun_arg, solve};
 use crate::cli::auto::sequence::PoseSequence;
 use crate::model::{CaptureOptions, Goal, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
@@ -36,41 +36,41 @@ use solve::Solution;
 #[derive(Debug, Args)]
 pub struct AutoArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
-    #[arg(long, value_name = "ADDR")]
+    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
     connect: Option<String>,
     #[command(flatten)]
     objects: ObjectArgs,
     /// `seed10` (the ten reference poses), a pose file, `auto` (planned views of the board), or `guided` (each pose chosen
     /// by what the captures so far leave open, until the goal is reached). `seed10` if not given, and `guided` with an option
     /// of guided capture.
-    #[arg(long, value_name = "seed10|FILE|auto|guided")]
+    #[arg(long, value_name = "seed10|FILE|auto|guided", help_heading = heading::POSES)]
     poses: Option<String>,
     #[command(flatten)]
     guided: GuidedArgs,
     /// What the arm must not touch, besides what the scene has: a file of boxes, with a work volume and limits of speed if wanted
     /// (docs/surroundings.md). Every motion to joint values is then checked before it begins.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
     keep_out: Option<PathBuf>,
     /// The chain of the arm by a built-in name or a URDF file, in place of the one that is read from the simulation. One
     /// that puts the tip elsewhere than the robot reports it is refused.
-    #[arg(long, value_name = "NAME|URDF")]
+    #[arg(long, value_name = "NAME|URDF", help_heading = heading::CELL)]
     arm: Option<String>,
     /// Folder of the session; a new one under `sessions` if not given.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     out: Option<PathBuf>,
     /// Write the result as JSON to this file too; `-` for standard output instead of the report.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
     #[command(flatten)]
     scene: SceneArg,
     /// Seed of everything random in the built-in cell, and of planned poses.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::CELL)]
     seed: Option<u64>,
     /// Run the built-in cell like real time instead of as fast as it can.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::CELL)]
     real_time: bool,
     /// Images that are averaged for each capture.
-    #[arg(long, value_name = "N", default_value_t = CaptureOptions::default().frames, value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", default_value_t = CaptureOptions::default().frames, value_parser = clap::value_parser!(u32).range(1..=64), help_heading = heading::POSES)]
     frames: u32,
     #[command(flatten)]
     rerun: RerunArg,
@@ -78,23 +78,22 @@ pub struct AutoArgs {
 
 /// What guided capture is asked for.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "With --poses guided")]
 struct GuidedArgs {
     /// Expected error (95 %) to be reached, millimetres; 0.3 if not given.
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", value_parser = positive, help_heading = heading::GUIDED)]
     goal: Option<f64>,
     /// Captures at the most; 40 if not given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=400))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=400), help_heading = heading::GUIDED)]
     max_poses: Option<u32>,
     /// Minutes of the cell's time at the most; no limit if not given.
-    #[arg(long, value_name = "MIN", value_parser = positive)]
+    #[arg(long, value_name = "MIN", value_parser = positive, help_heading = heading::GUIDED)]
     max_minutes: Option<f64>,
     /// Captures afterwards, at poses at random, that never enter the fit and check the answer; 3 if not given.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100), help_heading = heading::GUIDED)]
     check_poses: Option<u32>,
     /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. The goal then holds for
     /// the worst point of it; without it for where the camera saw the board.
-    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true, help_heading = heading::GUIDED)]
     tool_box: Option<TipBox>,
 }
 
@@ -128,6 +127,11 @@ impl GuidedArgs {
         }
     }
 }
+
+/// At the end of its help.
+pub const EXAMPLES: &str = "Examples:
+  handeye auto --poses seed10 --out session --json result.json
+  handeye auto --poses guided --goal 0.3 --scene panda --out guided";
 
 pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();

@@ -8,7 +8,7 @@ use handeye_sim_link::client::Endpoint;
 use handeye_sim_link::driver::fake::{Fake, FakeError, FakeOptions, FakePart};
 
 use crate::cli::cell::SceneArg;
-use crate::cli::{Failure, out};
+use crate::cli::{Failure, heading, out};
 
 /// Options of `handeye driver fake`.
 #[derive(Debug, Args)]
@@ -16,20 +16,20 @@ pub struct FakeArgs {
     #[command(flatten)]
     scene: SceneArg,
     /// Seed of everything random in the cell; the scene's own if not given.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::CELL)]
     seed: Option<u64>,
     /// Be a driver of a cell that runs already (`handeye cell`) and not of one of its own.
-    #[arg(long, value_name = "ADDR", conflicts_with_all = ["scene", "seed"])]
+    #[arg(long, value_name = "ADDR", conflicts_with_all = ["scene", "seed"], help_heading = heading::CELL)]
     connect: Option<Endpoint>,
     /// Be the driver of one part alone, so that robot and camera are two programs.
-    #[arg(long, value_name = "PART")]
+    #[arg(long, value_name = "PART", help_heading = heading::CELL)]
     only: Option<Part>,
     /// Where the clock of the stamps begins, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true, help_heading = heading::CELL)]
     clock: f64,
     /// Listen at this address for one workbench after the other, in place of standard input and output; port 0 picks one that is
     /// free. Whoever can connect can move the arm: there is no password.
-    #[arg(long, value_name = "ADDR:PORT")]
+    #[arg(long, value_name = "ADDR:PORT", help_heading = heading::ACCESS)]
     listen: Option<String>,
 }
 

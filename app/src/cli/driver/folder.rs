@@ -9,7 +9,7 @@ use handeye_core::project::dataset::PoseFormat;
 use handeye_sim_link::drivers::folder::{Folder, FolderOptions};
 
 use super::{serve, size};
-use crate::cli::Failure;
+use crate::cli::{Failure, heading};
 
 /// Options of `handeye driver folder`.
 #[derive(Debug, Args)]
@@ -18,35 +18,35 @@ pub struct FolderArgs {
     #[arg(value_name = "DIR")]
     folder: PathBuf,
     /// There are no poses, only images.
-    #[arg(long, conflicts_with_all = ["poses", "length_unit", "rotation", "angle_unit", "pose", "joints", "joint_unit"])]
+    #[arg(long, conflicts_with_all = ["poses", "length_unit", "rotation", "angle_unit", "pose", "joints", "joint_unit"], help_heading = heading::MEANING)]
     images_only: bool,
     /// Table of poses in the folder; poses.csv if not given.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::MEANING)]
     poses: Option<String>,
     /// Unit of positions: m or mm. This and what follows are the keys of [robot] in a dataset.toml, which are taken from there
     /// where the folder has one.
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = heading::MEANING)]
     length_unit: Option<String>,
     /// How rotations are written: quaternion_xyzw, quaternion_wxyz, rotation_vector, rpy or matrix.
-    #[arg(long, value_name = "WORD")]
+    #[arg(long, value_name = "WORD", help_heading = heading::MEANING)]
     rotation: Option<String>,
     /// Unit of rotation_vector and rpy: rad or deg.
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = heading::MEANING)]
     angle_unit: Option<String>,
     /// What a pose states: base_from_tip or tip_from_base.
-    #[arg(long, value_name = "WORD")]
+    #[arg(long, value_name = "WORD", help_heading = heading::MEANING)]
     pose: Option<String>,
     /// How many joint angles follow the rotation.
-    #[arg(long, value_name = "N", requires = "joint_unit")]
+    #[arg(long, value_name = "N", requires = "joint_unit", help_heading = heading::MEANING)]
     joints: Option<u8>,
     /// Unit of joint angles: rad or deg.
-    #[arg(long, value_name = "UNIT", requires = "joints")]
+    #[arg(long, value_name = "UNIT", requires = "joints", help_heading = heading::MEANING)]
     joint_unit: Option<String>,
     /// Size of the images, needed while there is none yet.
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, help_heading = heading::CELL)]
     size: Option<(u32, u32)>,
     /// How long each capture is shown at least before the next, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = seconds, help_heading = heading::CELL)]
     hold: f64,
 }
 

@@ -13,14 +13,15 @@ use handeye_sim_link::drivers::{self, Device};
 
 use super::Failure;
 
-pub const EXAMPLES: &str = "Example:
-  handeye driver test \"python3 assets/drivers/template.py\" --allow-motion
+pub const EXAMPLES: &str = "Examples:
+  handeye driver test \"handeye driver fake\" --allow-motion
   handeye driver test tcp://192.168.0.7:7000
   handeye driver fake --listen 127.0.0.1:7000";
 
-const ROSBRIDGE_EXAMPLES: &str = "Examples:
-  handeye driver test \"handeye driver rosbridge --url ws://192.168.0.7:9090\"         # lists the frames of tf
-  handeye driver test \"handeye driver rosbridge --url ws://192.168.0.7:9090 --base-frame base_link --tip-frame tool0 \\
+const ROSBRIDGE_EXAMPLES: &str = "Examples, the first of which lists the frames of tf:
+  handeye driver test \"handeye driver rosbridge --url ws://192.168.0.7:9090\"
+  handeye driver test \"handeye driver rosbridge --url ws://192.168.0.7:9090 \\
+      --base-frame base_link --tip-frame tool0 \\
       --image /camera/image_raw --camera-info /camera/camera_info\"";
 
 /// Options of `handeye driver`.
@@ -36,24 +37,26 @@ enum DriverCommand {
     #[command(after_help = EXAMPLES)]
     Test(test::TestArgs),
     /// Be a driver with the built-in cell behind it, on standard input and output or over TCP.
-    #[command(after_help = "Example:\n  handeye driver test \"handeye driver fake\" --allow-motion")]
+    #[command(after_help = "Examples:\n  handeye driver test \"handeye driver fake\" --allow-motion")]
     Fake(fake::FakeArgs),
     /// Be a driver that reads a controller of Universal Robots through RTDE.
-    #[command(after_help = "Example:\n  handeye driver test \"handeye driver ur-rtde --host 192.168.0.10 --arm ur5e\"")]
+    #[command(
+        after_help = "Examples:\n  handeye driver test \"handeye driver ur-rtde --host 192.168.0.10 --arm ur5e\""
+    )]
     UrRtde(ur_rtde::UrRtdeArgs),
     /// Be a driver that reads ROS 1 or ROS 2 through a rosbridge.
     #[command(after_help = ROSBRIDGE_EXAMPLES)]
     Rosbridge(rosbridge::RosbridgeArgs),
     /// Be a driver that shows each image that comes into a folder, with its pose.
     #[command(
-        after_help = "Example:\n  handeye driver folder captures --length-unit mm --rotation rpy --angle-unit deg \
-                            --pose base_from_tip"
+        after_help = "Examples:\n  handeye driver folder captures --length-unit mm --rotation rpy \\\n      --angle-unit deg \
+                      --pose base_from_tip"
     )]
     Folder(folder::FolderArgs),
     /// Be a driver of a USB camera, or another one of Video4Linux.
     #[cfg(target_os = "linux")]
     #[command(
-        after_help = "Example:\n  handeye driver test \"handeye driver v4l --device /dev/video0 --size 1280x720\""
+        after_help = "Examples:\n  handeye driver test \"handeye driver v4l --device /dev/video0 --size 1280x720\""
     )]
     V4l(v4l::V4lArgs),
 }

@@ -9,46 +9,46 @@ use handeye_sim_link::driver::message::{ArmMessage, JointMessage};
 use handeye_sim_link::drivers::rosbridge::{Rosbridge, RosbridgeOptions};
 
 use super::serve;
-use crate::cli::Failure;
+use crate::cli::{Failure, heading};
 
 /// Options of `handeye driver rosbridge`.
 #[derive(Debug, Args)]
 pub struct RosbridgeArgs {
     /// Address of the rosbridge.
-    #[arg(long, value_name = "URL", default_value = "ws://127.0.0.1:9090")]
+    #[arg(long, value_name = "URL", default_value = "ws://127.0.0.1:9090", help_heading = heading::CELL)]
     url: String,
     /// Frame of tf in which poses are stated, often base_link. Without this and --image, the frames are listed.
-    #[arg(long, value_name = "FRAME", requires = "tip_frame")]
+    #[arg(long, value_name = "FRAME", requires = "tip_frame", help_heading = heading::CELL)]
     base_frame: Option<String>,
     /// Frame of tf of the tip, often tool0.
-    #[arg(long, value_name = "FRAME", requires = "base_frame")]
+    #[arg(long, value_name = "FRAME", requires = "base_frame", help_heading = heading::CELL)]
     tip_frame: Option<String>,
     /// Topic of images, raw or compressed.
-    #[arg(long, value_name = "TOPIC")]
+    #[arg(long, value_name = "TOPIC", help_heading = heading::CELL)]
     image: Option<String>,
     /// Topic of sensor_msgs/CameraInfo, where the lens is calibrated.
-    #[arg(long, value_name = "TOPIC", requires = "image")]
+    #[arg(long, value_name = "TOPIC", requires = "image", help_heading = heading::CELL)]
     camera_info: Option<String>,
     /// The images are rectified: their lens is the projection matrix of the camera info, without distortion.
-    #[arg(long, requires = "camera_info")]
+    #[arg(long, requires = "camera_info", help_heading = heading::CELL)]
     rectified: bool,
     /// Topic of raw depth images, aligned to the images.
-    #[arg(long, value_name = "TOPIC", requires = "image")]
+    #[arg(long, value_name = "TOPIC", requires = "image", help_heading = heading::CELL)]
     depth: Option<String>,
     /// Topic of sensor_msgs/JointState. Which joints, say --joint-names or --urdf.
-    #[arg(long, value_name = "TOPIC", requires = "base_frame")]
+    #[arg(long, value_name = "TOPIC", requires = "base_frame", help_heading = heading::CELL)]
     joints: Option<String>,
     /// Names of the arm's joints from the base up, all revolute.
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "joints", conflicts_with = "urdf")]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "joints", conflicts_with = "urdf", help_heading = heading::CELL)]
     joint_names: Vec<String>,
     /// The arm's URDF: its joints between the base frame and the tip frame.
-    #[arg(long, value_name = "FILE", requires = "joints")]
+    #[arg(long, value_name = "FILE", requires = "joints", help_heading = heading::CELL)]
     urdf: Option<PathBuf>,
     /// Images a second at most.
-    #[arg(long, value_name = "HZ", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
+    #[arg(long, value_name = "HZ", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = heading::CELL)]
     image_rate: u16,
     /// Have rosbridge cut longer messages into pieces of so many bytes, where a proxy between does not let them through.
-    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(1000..))]
+    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(1000..), help_heading = heading::CELL)]
     fragment_size: Option<u32>,
 }
 

@@ -5,7 +5,7 @@ use handeye_sim_link::driver::conformance::{self, ConformanceOptions};
 use handeye_sim_link::driver::{BadSpec, DriverSpec};
 
 use crate::cli::output::Output;
-use crate::cli::{Failure, out, solve};
+use crate::cli::{Failure, heading, out, solve};
 
 /// Options of `handeye driver test`.
 #[derive(Debug, Args)]
@@ -14,13 +14,13 @@ pub struct TestArgs {
     #[arg(value_name = "COMMAND", required_unless_present = "tcp")]
     command: Option<String>,
     /// Connect to a driver that listens there, in place of a command.
-    #[arg(long, value_name = "HOST:PORT", conflicts_with = "command")]
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "command", help_heading = heading::CELL)]
     tcp: Option<String>,
     /// Allow the arm to be moved: by up to 0.2 rad in one joint, or 2 cm.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::CELL)]
     allow_motion: bool,
     /// Write the report as JSON to this file; `-` for standard output instead of the text.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
 }
 

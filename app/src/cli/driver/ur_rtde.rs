@@ -6,22 +6,22 @@ use handeye_sim_link::driver::message::ArmMessage;
 use handeye_sim_link::drivers::ur_rtde::{PORT, RtdeOptions, UrRtde, UrRtdeOptions};
 
 use super::serve;
-use crate::cli::Failure;
+use crate::cli::{Failure, heading};
 
 /// Options of `handeye driver ur-rtde`.
 #[derive(Debug, Args)]
 pub struct UrRtdeArgs {
     /// Address of the controller, as the pendant shows it.
-    #[arg(long, value_name = "ADDR")]
+    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
     host: String,
     /// Port of its RTDE.
-    #[arg(long, value_name = "PORT", default_value_t = PORT)]
+    #[arg(long, value_name = "PORT", default_value_t = PORT, help_heading = heading::CELL)]
     port: u16,
     /// States a second: up to 125 from a CB3, up to 500 from an e-Series.
-    #[arg(long, value_name = "HZ", default_value_t = 125, value_parser = clap::value_parser!(u16).range(10..=500))]
+    #[arg(long, value_name = "HZ", default_value_t = 125, value_parser = clap::value_parser!(u16).range(10..=500), help_heading = heading::CELL)]
     frequency: u16,
     /// Which arm it is, such as ur5e: the controller does not say.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = heading::CELL)]
     arm: Option<String>,
 }
 

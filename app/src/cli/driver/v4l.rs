@@ -6,22 +6,22 @@ use clap::Args;
 use handeye_sim_link::drivers::v4l::{PixelFormat, V4l, V4lOptions};
 
 use super::{serve, size};
-use crate::cli::Failure;
+use crate::cli::{Failure, heading};
 
 /// Options of `handeye driver v4l`.
 #[derive(Debug, Args)]
 pub struct V4lArgs {
     /// The camera.
-    #[arg(long, value_name = "FILE", default_value = "/dev/video0")]
+    #[arg(long, value_name = "FILE", default_value = "/dev/video0", help_heading = heading::CELL)]
     device: PathBuf,
     /// Size of the images; the largest of the format if not given.
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, help_heading = heading::CELL)]
     size: Option<(u32, u32)>,
     /// Pixel format: RGB3, YUYV, GREY or MJPG; the first of these that the camera offers in this size if not given.
-    #[arg(long, value_name = "NAME", value_parser = format)]
+    #[arg(long, value_name = "NAME", value_parser = format, help_heading = heading::CELL)]
     format: Option<PixelFormat>,
     /// Images a second; the camera's choice if not given.
-    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = heading::CELL)]
     rate: Option<u32>,
 }
 

@@ -15,58 +15,66 @@ use handeye_sim_link::client::cell::{BoardMotion, BoardPath};
 
 use super::cell::SceneArg;
 use super::output::Output;
-use super::{Failure, ObjectArgs, RerunArg, out, rerun_arg, solve};
+use super::{Failure, ObjectArgs, RerunArg, heading, out, rerun_arg, solve};
 use crate::model::{FollowWish, Tracked};
 use crate::rerun_log::{Pace, RerunChoice};
 use live::{Job, Live, Summary, Taken, Task};
+
+/// At the end of its help.
+pub const EXAMPLES: &str = "Examples:
+  handeye auto --out session
+  handeye track --calibration session/result.json --frames 100
+
+Until Ctrl-C:
+  handeye track --calibration session/result.json --follow";
 
 /// Options of `handeye track`.
 #[derive(Debug, Args)]
 pub struct TrackArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started, with a board that moves.
-    #[arg(long, value_name = "ADDR")]
+    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
     connect: Option<String>,
     #[command(flatten)]
     objects: ObjectArgs,
     /// The calibration: a result JSON, or a session that is solved.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::TRACKING)]
     calibration: PathBuf,
     /// Have the arm keep the view of the board that it has at the beginning.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::FOLLOWING)]
     follow: bool,
     /// With --follow: where the arm has no room to go along with the board, move it to the nearest place where it has, as
     /// soon as the board is seen, and keep the view from there.
-    #[arg(long, requires = "follow", conflicts_with = "corner")]
+    #[arg(long, requires = "follow", conflicts_with = "corner", help_heading = heading::FOLLOWING)]
     make_room: bool,
     /// With --follow: bring the tip to this corner of the board instead, counted from 0.
-    #[arg(long, value_name = "INDEX", requires = "follow")]
+    #[arg(long, value_name = "INDEX", requires = "follow", help_heading = heading::FOLLOWING)]
     corner: Option<usize>,
     /// Move the tip once to this corner of the board, counted from 0, with the orientation that it has; then end.
-    #[arg(long, value_name = "INDEX", conflicts_with = "follow")]
+    #[arg(long, value_name = "INDEX", conflicts_with = "follow", help_heading = heading::FOLLOWING)]
     reach: Option<usize>,
     /// With --corner and --reach: how far the tip stays off the board, millimetres.
-    #[arg(long, value_name = "MM", default_value_t = 100.0)]
+    #[arg(long, value_name = "MM", default_value_t = 100.0, help_heading = heading::FOLLOWING)]
     stand_off: f64,
     /// End after so many images; without it, at Ctrl-C.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::TRACKING)]
     frames: Option<u64>,
     /// Write every pose and a summary as JSON to this file; `-` for standard output instead of the summary.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
     /// The chessboard, if the calibration does not say it: inner corners along x and y, and the square.
-    #[arg(long, value_name = "COLUMNSxROWSxMM")]
+    #[arg(long, value_name = "COLUMNSxROWSxMM", help_heading = heading::TRACKING)]
     target: Option<String>,
     #[command(flatten)]
     scene: SceneArg,
     /// Seed of everything random in the built-in cell.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::CELL)]
     seed: Option<u64>,
     /// How the built-in cell moves its board: still, circle, figure_eight, random_walk or step; a circle if neither this
     /// nor the scene says it.
-    #[arg(long, value_name = "PATH", conflicts_with = "connect")]
+    #[arg(long, value_name = "PATH", conflicts_with = "connect", help_heading = heading::BOARD)]
     board_path: Option<BoardPath>,
     /// How fast, metres per second; as the scene says if not given.
-    #[arg(long, value_name = "SPEED", conflicts_with = "connect")]
+    #[arg(long, value_name = "SPEED", conflicts_with = "connect", help_heading = heading::BOARD)]
     board_speed: Option<f64>,
     #[command(flatten)]
     rerun: RerunArg,

@@ -39,6 +39,9 @@ fn content_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.set_min_width(220.0);
     item_ui(ui, outbox, tr!(language, "New session…"), "Ctrl+N", Command::SetDialog(Some(Dialog::New)));
     item_ui(ui, outbox, tr!(language, "Open session…"), "Ctrl+O", Command::SetDialog(Some(Dialog::Open)));
+    if !model.opening && !model.sequence_runs {
+        item_ui(ui, outbox, tr!(language, "Open a sample"), "", Command::OpenSample);
+    }
     item_ui(ui, outbox, tr!(language, "Save session…"), "Ctrl+S", Command::SetDialog(Some(Dialog::SaveAs)));
     ui.separator();
     ui.menu_button(tr!(language, "Theme"), |ui| {

@@ -136,18 +136,24 @@ pub fn hatch(painter: &Painter, rect: Rect, colour: Color32) {
 
 /// A title and what to do, in the middle of a pane that has nothing to show.
 pub fn nothing_yet_ui(ui: &mut Ui, title: &str, detail: &str) {
+    nothing_yet_but_ui(ui, title, detail, 60.0, |_| ());
+}
+
+/// The same, with what else can be done below it; `height` is about that of all of it.
+pub fn nothing_yet_but_ui(ui: &mut Ui, title: &str, detail: &str, height: f32, more_ui: impl FnOnce(&mut Ui)) {
     const TEXT_WIDTH: f32 = 440.0;
     let palette = Palette::of(ui);
     let size = ui.available_size();
     ui.allocate_ui_with_layout(size, egui::Layout::top_down(egui::Align::Center), |ui| {
         ui.set_min_size(size);
-        ui.add_space(((size.y - 60.0) * 0.42).max(0.0));
+        ui.add_space(((size.y - height) * 0.42).max(0.0));
         ui.scope(|ui| {
             ui.set_max_width(TEXT_WIDTH.min(size.x - 24.0).max(0.0));
             ui.label(egui::RichText::new(title).size(15.0).color(palette.text));
             ui.add_space(4.0);
             let detail = egui::RichText::new(detail).color(palette.weak);
             ui.add(egui::Label::new(detail).wrap().halign(egui::Align::Center));
+            more_ui(ui);
         });
     });
 }

@@ -12,6 +12,7 @@ use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::command::Event;
 use crate::import::state::Converted;
 use crate::model::Severity;
+use crate::sample;
 use crate::session::start;
 use crate::text;
 use crate::text::Text;
@@ -28,6 +29,19 @@ impl Archive {
     pub(super) fn import(&mut self, dataset: &Path, bounds: &Bounds) {
         let name = dataset.file_name().unwrap_or_default().to_string_lossy().into_owned();
         self.import_as(dataset, &name, bounds);
+    }
+
+    pub(super) fn import_sample(&mut self) {
+        let unpacked = tempfile::tempdir().and_then(|folder| sample::write(folder.path()).map(|()| folder));
+        match unpacked {
+            Ok(folder) => {
+                self.import_as(folder.path(), sample::NAME, &Bounds::within(folder.path()));
+            }
+            Err(error) => {
+                let why = text!("The data set was not opened: {why}", why = said_by(error));
+                self.outlet.report(Event::SessionFailed { why });
+            }
+        }
     }
 
     /// The session keeps how the recording was understood.

@@ -53,6 +53,8 @@ pub enum ArchiveTask {
         /// What its files may name.
         bounds: Bounds,
     },
+    /// Begin a session with the recorded sample that comes with the program.
+    Sample,
     /// Begin a session with a recording that was made a data set.
     Import(Arc<Converted>),
     /// Go on with the session in a folder, or begin one there when there is none.
@@ -133,6 +135,7 @@ impl Archive {
             }
             ArchiveTask::New { folder, beginning } => self.begin(folder, *beginning),
             ArchiveTask::Open { folder, bounds } => self.open(&folder, &bounds),
+            ArchiveTask::Sample => self.import_sample(),
             ArchiveTask::Import(converted) => self.import_converted(&converted),
             ArchiveTask::OpenOrNew { folder, beginning } => {
                 if kind_of(&folder) == FolderKind::Plain {

@@ -5,29 +5,46 @@ use super::error::ImportError;
 use crate::estimate::handeye::Mode;
 
 /// The keys of `--set` and their values, for `--help`.
-pub const KEYS: &str = "\
-  mode=eye_in_hand|eye_to_hand          where the camera sits
-  length_unit=m|mm|cm                   of the robot's positions
-  angle_unit=rad|deg                    of its angles
-  rotation=NAME                         quaternion_xyzw, quaternion_wxyz, rotation_vector, matrix, rpy, kuka_abc,
-                                        fanuc_wpr, euler_xyz (fixed axes) or euler_XYZ (moving axes) with any axes, or
-                                        euler_zyx_321: a product from left to right, and which number turns about which
-  pose=base_from_tip|tip_from_base      which way the robot's poses map
-  pairing=RULE                          which image belongs to which pose, one of the rules that are listed
-  images=NAME                           which images, where there are several kinds
-  poses=NAME                            which series of poses is the robot's
-  target_poses=NAME                     which is the target's, where there are no images
+pub const KEYS: &str = "  mode=eye_in_hand|eye_to_hand
+          where the camera sits
+  length_unit=m|mm|cm
+          of the robot's positions
+  angle_unit=rad|deg
+          of its angles
+  rotation=NAME
+          quaternion_xyzw, quaternion_wxyz, rotation_vector, matrix, rpy,
+          kuka_abc, fanuc_wpr, euler_xyz (fixed axes) or euler_XYZ (moving
+          axes) with any axes, or euler_zyx_321: a product from left to right,
+          and which number turns about which
+  pose=base_from_tip|tip_from_base
+          which way the robot's poses map
+  pairing=RULE
+          which image belongs to which pose, one of the rules that are listed
+  images=NAME
+          which images, where there are several kinds
+  poses=NAME
+          which series of poses is the robot's
+  target_poses=NAME
+          which is the target's, where there are no images
   target_pose=camera_from_target|target_from_camera
-  target_length_unit=m|mm|cm            of the target's poses
-  target_rotation=NAME                  of the target's poses
-  camera=FILE|none                      which camera is taken as known
-  image_size=WIDTHxHEIGHT               of the images that recorded corners are from, in pixels, where no file says it
-  joint_unit=rad|deg                    takes over the joint values that stand with the poses
-  clock_offset=SECONDS                  what is added to stamps of images to have them by the robot's clock, roughly, where the
-                                        clocks of a bag are apart by more than 2 s
+          which way the target's poses map
+  target_length_unit=m|mm|cm
+          of the target's poses
+  target_rotation=NAME
+          of the target's poses
+  camera=FILE|none
+          which camera is taken as known
+  image_size=WIDTHxHEIGHT
+          of the images that recorded corners are from, in pixels, where no
+          file says it
+  joint_unit=rad|deg
+          takes over the joint values that stand with the poses
+  clock_offset=SECONDS
+          what is added to stamps of images to have them by the robot's clock,
+          roughly, where the clocks of a bag are apart by more than 2 s
   arm=NAME|FILE.urdf[,base=LINK][,tip=LINK]
-                                        makes poses of joint values by this chain: ur3, ur5, ur10, ur3e, ur5e, ur10e, ur16e,
-                                        ur5_coppeliasim or one in a URDF file";
+          makes poses of joint values by this chain: ur3, ur5, ur10, ur3e,
+          ur5e, ur10e, ur16e, ur5_coppeliasim or one in a URDF file";
 
 /// Choices that were made; `None` where all are tried.
 #[derive(Debug, Clone, Default, PartialEq)]
