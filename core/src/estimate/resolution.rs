@@ -9,6 +9,8 @@
 //! Derivation: `docs/maths/resolution.md`.
 
 use crate::estimate::handeye::joint::Noise;
+use crate::text;
+use crate::wording::{Value, shown};
 
 /// What all corners of a view may be off by together, pixels: half a grey level over a contrast of 160, which is how far an edge
 /// moves when all its pixels are rounded alike. More would hide what sharp images of 0.03 px show of a lens.
@@ -26,6 +28,20 @@ pub(crate) fn is_resolved(metres: f64, radians: f64) -> bool {
     metres >= PLACE_M || radians >= ANGLE_RAD
 }
 
+/// A length \[m\] of the robot in words: what no robot resolves is below that.
+pub(crate) fn place_said(metres: f64) -> Value {
+    said(metres, PLACE_M, &|m| format!("{} mm", shown(m * 1e3, 3)))
+}
+
+/// An angle \[rad\] likewise.
+pub(crate) fn angle_said(radians: f64) -> Value {
+    said(radians, ANGLE_RAD, &|rad| format!("{}°", shown(rad.to_degrees(), 3)))
+}
+
+fn said(value: f64, least: f64, number: &dyn Fn(f64) -> String) -> Value {
+    if value < least { text!("below {high}", high = number(least)).into() } else { number(value).into() }
+}
+
 /// The noise levels of the robot that views are judged by.
 pub(crate) fn judged_by(noise: &Noise) -> Noise {
     Noise { robot_m: noise.robot_m.max(PLACE_M), robot_rad: noise.robot_rad.max(ANGLE_RAD), ..*noise }
@@ -40,6 +56,7 @@ pub(crate) fn pose_variance_px2(variance_px2: f64, corners: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wording::{English, Text};
 
     #[test]
     fn the_noise_of_a_real_session_is_judged_as_it_is_and_none_as_the_least() {
@@ -51,5 +68,12 @@ mod tests {
         // That shift of every corner is one standard deviation of the pose, however many there are.
         assert!((pose_variance_px2(0.0, 70) - 70.0 * 9e-6).abs() < 1e-15);
         assert!(!is_resolved(9e-6, 1.7e-5) && is_resolved(1e-5, 0.0) && is_resolved(0.0, 1.8e-5));
+    }
+
+    #[test]
+    fn what_no_robot_resolves_is_said_to_be_below_that_and_not_with_its_zeros() {
+        let said = |value: Value| Text::new("{it}", vec![("it", value)]).say(English);
+        assert_eq!([said(place_said(3.96e-4)), said(angle_said(1e-3))], ["0.396 mm", "0.057°"]);
+        assert_eq!([said(place_said(0.0)), said(angle_said(1e-9))], ["below 0.010 mm", "below 0.001°"]);
     }
 }

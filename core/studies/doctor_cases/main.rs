@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release -p handeye_core --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
 //! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
-//! sessions with an arm whose error depends on where it stands; one alone with its report; `… -- limits [SESSIONS]` for the sizes
-//! from which on faults are found.
+//! sessions with an arm whose error depends on where it stands; one alone with its report; `… -- servo [SESSIONS] [FIRST]` for those
+//! of an arm of servo motors, and for a board that slipped in them; `… -- limits [SESSIONS]` for the sizes from which on faults are
+//! found.
 
 mod cases;
 mod faults;
@@ -12,6 +13,10 @@ use std::collections::BTreeMap;
 
 use handeye_core::diagnose::doctor::Detail;
 use handeye_core::diagnose::findings::Severity;
+use handeye_core::estimate::Options;
+use handeye_core::estimate::shared_lens::{NamedSession, calibrate_sharing_lens};
+use handeye_core::progress::CancelToken;
+use handeye_core::testing::faulty::{Setup, session};
 use handeye_core::wording::English;
 
 fn number(argument: Option<String>, otherwise: u64) -> u64 {
@@ -36,6 +41,55 @@ fn as_met(first: u64, sessions: u64) {
         }
     }
     println!("a cause named in {alarmed} of {sessions} healthy sessions as they are met: {alarms:?}\n");
+}
+
+/// Moves that are named in sessions of an arm of servo motors: in healthy ones, and where the board slipped by so many millimetres
+/// in the middle.
+fn servo(first: u64, sessions: u64) {
+    for slip_m in [0.0, 0.01, 0.02] {
+        let mut codes = BTreeMap::<String, usize>::new();
+        let mut named = 0;
+        for seed in first..first + sessions {
+            let mut setup = faults::servo(seed);
+            if slip_m > 0.0 {
+                let twist = [slip_m * 0.6, -slip_m * 0.8, 0.0, 0.0, 0.0, 0.0].into();
+                setup.fault.board_moved = Some((setup.views / 2, twist));
+            }
+            let diagnosis = faults::examined(&session(&setup));
+            let moves: Vec<_> = diagnosis.findings.iter().filter(|finding| faults::names_a_move(finding)).collect();
+            named += usize::from(!moves.is_empty());
+            for finding in moves {
+                *codes.entry(format!("{:?}", finding.code)).or_default() += 1;
+                if slip_m == 0.0 {
+                    println!("servo {seed}, {setup}: {finding}");
+                }
+            }
+        }
+        println!("board slipped by {} mm: a move named in {named} of {sessions} sessions: {codes:?}", slip_m * 1e3);
+    }
+}
+
+/// Groups of eleven sessions of one camera on an arm of servo motors: lenses that are said to differ.
+fn lenses(first: u64, groups: u64) {
+    for group in first..first + groups {
+        let sessions: Vec<_> =
+            (0..11).map(|k| session(&Setup { estimated: true, ..faults::servo(11 * group + k) })).collect();
+        let names: Vec<String> = (0..11).map(|k| k.to_string()).collect();
+        let named: Vec<_> =
+            names.iter().zip(&sessions).map(|(name, observations)| NamedSession { name, observations }).collect();
+        match calibrate_sharing_lens(&named, Options::default(), &CancelToken::default()) {
+            Ok(found) => {
+                let shared = found[0].shared_lens.as_ref();
+                let odd = shared.map_or(0, |shared| shared.odd.len());
+                let another = shared.map_or(0, |shared| shared.odd.iter().filter(|odd| odd.is_another_lens()).count());
+                println!("group {group}: {odd} of 11 differ, {another} of them are other lenses");
+                for odd in shared.iter().flat_map(|shared| &shared.odd) {
+                    println!("  {odd:?}");
+                }
+            }
+            Err(error) => println!("group {group}: {error}"),
+        }
+    }
 }
 
 /// Whether a fault is the first explanation and accepted, or what is said instead.
@@ -96,6 +150,16 @@ fn main() {
     if arguments.next_if(|a| a == "as-met").is_some() {
         let sessions = number(arguments.next(), 200);
         as_met(number(arguments.next(), 0), sessions);
+        return;
+    }
+    if arguments.next_if(|a| a == "servo").is_some() {
+        let sessions = number(arguments.next(), 200);
+        servo(number(arguments.next(), 0), sessions);
+        return;
+    }
+    if arguments.next_if(|a| a == "lenses").is_some() {
+        let groups = number(arguments.next(), 10);
+        lenses(number(arguments.next(), 0), groups);
         return;
     }
     if arguments.next_if(|a| a == "limits").is_some() {

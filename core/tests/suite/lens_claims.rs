@@ -49,6 +49,23 @@ fn a_given_lens_whose_centre_is_half_a_pixel_off_is_named_and_counted() {
     }
 }
 
+/// A dozen views by an arm that scatters by 0.1 mm tell hardly any centre from another, and half a pixel from none.
+#[test]
+fn half_a_pixel_is_named_where_another_centre_would_not_be() {
+    let mut found = 0;
+    for seed in 0..4 {
+        let session = Scene { corner_px: 0.03, ..Scene::new(Mode::EyeInHand, 12) }.draw(seed);
+        let said = |off: f64| {
+            let (_, diagnosis) = examined(&session.given([off; 2]));
+            named(&diagnosis, FindingCode::WrongIntrinsics).map(ToString::to_string)
+        };
+        let off = if seed % 2 == 0 { 0.5 } else { -0.5 };
+        found += usize::from(said(off).is_some_and(|said| said.contains("half a pixel")));
+        assert_eq!(said(0.0), None, "{seed}");
+    }
+    assert!(found >= 2, "in {found} of 4");
+}
+
 #[test]
 fn a_given_lens_that_is_right_is_not_accused() {
     for mode in MODES {

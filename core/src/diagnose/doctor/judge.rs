@@ -1,11 +1,12 @@
 //! One hypothesis judged: fitted with noise levels of its own, tested, and asked to predict views left out.
 
-use nalgebra::{DVector, Matrix6, Vector6};
+use nalgebra::{DVector, Matrix6, Vector2, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
 use super::screen::{Candidate, view_score};
+use super::weight::{Weight, alternatives, is_significant};
 use crate::estimate::size::FALSE_ALARM as ALPHA;
 use crate::estimate::uncertainty::quality::BY_CHANCE;
 use crate::geometry::statistics::{better_by_chance, outliers};
@@ -39,6 +40,8 @@ pub(super) struct Judged {
     pub gain: f64,
     pub score: f64,
     pub significant: bool,
+    /// The error of a centre that was given, where it is one that is stated beforehand, pixels.
+    pub stated_px: Option<Vector2<f64>>,
     pub matters: bool,
     /// Logarithm of the number of alternatives among which it is the best.
     ln_alternatives: f64,
@@ -101,22 +104,6 @@ impl Judged {
     }
 }
 
-/// Logarithm of the number of alternatives among which the best was picked.
-pub(super) fn alternatives(model: &Model<'_>, effect: Effect) -> f64 {
-    let views = model.sight.views.len() as f64;
-    match effect {
-        Effect::BoardMoved(_) | Effect::CameraMoved(_) => views.ln(),
-        Effect::Joint(_) => (model.sight.joints().max(1) as f64).ln(),
-        _ => 0.0,
-    }
-}
-
-pub(super) fn is_significant(wald: f64, numbers: usize, freedom: f64, ln_alternatives: f64) -> bool {
-    let Ok(distribution) = FisherSnedecor::new(numbers as f64, freedom) else { return false };
-    let statistic = wald / numbers as f64;
-    statistic.is_finite() && distribution.sf(statistic) * ln_alternatives.exp() < ALPHA
-}
-
 /// A hypothesis fitted and tested. What is asked of it besides, which takes most of the work, is for [`confirm`].
 pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: Candidate) -> Option<Judged> {
     let mut next = state.clone();
@@ -126,35 +113,31 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         Candidate::Views(views) => next.aside.extend(views),
     }
     let fit = model.fit(&next, before.levels)?;
-    let (wald, count, freedom, numbers, sigma, ln_alternatives);
+    let (weight, numbers, sigma, ln_alternatives);
     match &candidate {
         Candidate::Effect(effect) => {
-            count = effect.numbers(lens);
+            let count = effect.numbers(lens);
             let at = fit.width() - count;
-            wald = fit.wald(at, count)?;
-            let form = if effect.is_of_lens() { model.sight.form_freedom } else { f64::INFINITY };
-            freedom = fit.freedom(at, count).min(form);
+            weight = Weight::of_effect(model, &fit, *effect, at)?;
             numbers = fit.theta.rows(at, count).iter().copied().collect();
             sigma = (at..at + count).map(|i| fit.covariance[(i, i)].max(0.0).sqrt()).collect();
             ln_alternatives = alternatives(model, *effect);
         }
         Candidate::Views(views) => {
-            count = 6 * views.len();
-            wald = fit.wald_of_views(views)?;
-            freedom = least_freedom(&fit, views)?;
-            (numbers, sigma) = (Vec::new(), Vec::new());
+            let freedom = least_freedom(&fit, views)?;
             ln_alternatives = ln_choose(model.sight.views.len(), views.len());
+            weight = Weight::of_free(fit.wald_of_views(views)?, 6 * views.len(), freedom, ln_alternatives, fit.views);
+            (numbers, sigma) = (Vec::new(), Vec::new());
         }
     }
-    let gain = 0.5 * freedom * (wald / freedom).ln_1p();
     let level = |k: usize| (before.levels.noise[k].sqrt(), fit.levels.noise[k].sqrt());
     let mut judged = Judged {
         numbers,
         sigma,
-        gain,
-        // As in the Bayesian information criterion.
-        score: gain - 0.5 * count as f64 * (6.0 * fit.views as f64).ln() - ln_alternatives,
-        significant: is_significant(wald, count, freedom, ln_alternatives),
+        gain: weight.gain,
+        score: weight.score,
+        significant: weight.significant,
+        stated_px: weight.stated_px,
         matters: false,
         ln_alternatives,
         as_good: false,

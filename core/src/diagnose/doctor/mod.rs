@@ -29,6 +29,7 @@ mod report;
 mod screen;
 mod select;
 pub(crate) mod views;
+mod weight;
 mod words;
 
 use serde::Serialize;

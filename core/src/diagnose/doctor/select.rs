@@ -3,10 +3,11 @@
 
 use super::agreement::Agreement;
 use super::effect::Effect;
-use super::judge::{Judged, LEAST_SCALE, alternatives, confirm, is_significant, judge};
+use super::judge::{Judged, LEAST_SCALE, confirm, judge};
 use super::model::{Fit, Levels, Model, State};
 use super::screen::{Candidate, screened};
 use super::views::SessionViews;
+use super::weight::Weight;
 use crate::estimate::TargetSize;
 use crate::estimate::handeye::joint::field::Places;
 use crate::progress::Work;
@@ -140,11 +141,10 @@ fn drop_overtaken(model: &Model<'_>, state: &mut State, fit: &mut Fit, taken: &m
         let mut at = model.effects_at();
         let mut weak = None;
         for effect in &state.effects {
-            let count = effect.numbers(lens);
-            if !is_significant(fit.wald(at, count)?, count, fit.freedom(at, count), alternatives(model, *effect)) {
+            if !Weight::of_effect(model, fit, *effect, at)?.significant {
                 weak = Some(*effect);
             }
-            at += count;
+            at += effect.numbers(lens);
         }
         let Some(weak) = weak else { return Some(()) };
         state.effects.retain(|e| *e != weak);

@@ -244,10 +244,10 @@ fn robot_noise(calibration: &Calibration) -> Option<Finding> {
     }
     let (mm, deg) = (noise.robot_m * 1e3, noise.robot_rad.to_degrees());
     let text = text!(
-        "The robot limits the answer: its noise of {mm} mm and {deg}° per axis moves corners by {robot} px, their own noise \
-         is {corner} px. Better images will not help much; settling longer before each will.",
-        mm = shown(mm, 3),
-        deg = shown(deg, 3),
+        "The robot limits the answer: its noise of {position} and {orientation} per axis moves corners by {robot} px, their \
+         own noise is {corner} px. Better images will not help much; settling longer before each will.",
+        position = resolution::place_said(noise.robot_m),
+        orientation = resolution::angle_said(noise.robot_rad),
         robot = shown(robot_px, 2),
         corner = shown(corner_px, 2)
     );

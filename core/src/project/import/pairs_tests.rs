@@ -6,7 +6,7 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use super::tests::{Written, in_hand, numbers, observed, pose_of, row, save_image};
+use super::tests::{Written, in_hand, known, numbers, observed, pose_of, row, save_image};
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::{CameraKnowledge, Observations};
@@ -238,15 +238,7 @@ fn corners_in_json_become_the_corners_of_a_data_set() {
         let judgement = judge(&recording, &sights, &in_hand(), &CancelToken::default()).expect("hypotheses");
         assert_eq!(judgement.verdict, Verdict::Decided, "{form}: {:#?}", judgement.hypotheses[0]);
         let settings = in_hand();
-        let target = Some((session.target, "described".into()));
-        let context = write::Context {
-            recording: &recording,
-            judgement: &judgement,
-            settings: &settings,
-            target,
-            camera: None,
-            is_taken: false,
-        };
+        let context = known(&recording, &judgement, &settings, session.target);
         let out = folder.path().join("out");
         write::write(&plan(&judgement.hypotheses[0], &context, None), &out, |_, _| {}).expect("written");
         let data = Dataset::read(&out).expect("a data set");

@@ -20,6 +20,7 @@ use crate::geometry::se3;
 use crate::progress::CancelToken;
 use crate::project::dataset::Dataset;
 use crate::project::files::image_file;
+use crate::targets::TargetSpec;
 use crate::testing::faulty;
 
 pub(super) fn observed(mode: Mode, views: usize, seed: u64) -> Observations {
@@ -62,6 +63,17 @@ pub(super) fn judged(folder: &Path, session: &Observations, settings: &Settings)
     let judgement =
         judge(&recording, &sights(&recording, session), settings, &CancelToken::default()).expect("hypotheses");
     (recording, judgement)
+}
+
+/// What is known where the target was given, the camera was not, and nobody chose a hypothesis.
+pub(super) fn known<'a>(
+    recording: &'a Recording,
+    judgement: &'a Judgement,
+    settings: &'a Settings,
+    target: TargetSpec,
+) -> write::Context<'a> {
+    let target = Some((target, "given with --target".to_owned()));
+    write::Context { recording, judgement, settings, target, camera: None, is_taken: false }
 }
 
 pub(super) fn in_hand() -> Settings {
@@ -195,15 +207,7 @@ fn a_written_import_is_a_data_set_with_the_same_poses_to_nine_digits() {
     let folder = table_folder(&session, Written::KukaDegMm);
     let (recording, judgement) = judged(folder.path(), &session, &in_hand());
     let settings = in_hand();
-    let target = Some((session.target, "given with --target".to_owned()));
-    let known = write::Context {
-        recording: &recording,
-        judgement: &judgement,
-        settings: &settings,
-        target,
-        camera: None,
-        is_taken: false,
-    };
+    let known = known(&recording, &judgement, &settings, session.target);
     for link in [false, true] {
         let home = tempfile::tempdir().expect("a folder");
         let out = home.path().join("set");

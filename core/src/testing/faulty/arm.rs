@@ -12,6 +12,45 @@ const STARTS: [[f64; 6]; 3] =
 /// What every link has more than its data sheet says: `a`, `d` in metres, `alpha` and the joint's zero in radians.
 pub type LinkErrors = [[f64; 4]; 6];
 
+/// An arm of servo motors: what lies between the angles that are commanded and reported, and where the links are.
+#[derive(Debug, Clone, Copy)]
+pub struct Servo {
+    /// A gear or sensor that is not centred: amplitude \[rad\] once per turn, and its phase, of every joint.
+    pub eccentric: [[f64; 2]; 6],
+    /// Play of every joint, radians: a link stays behind by half of it on the side that it comes from.
+    pub play_rad: [f64; 6],
+    /// How far shoulder, elbow and wrist give way under the weight of a horizontal arm, radians.
+    pub sag_rad: [f64; 3],
+    /// Step of the sensor, radians.
+    pub step_rad: f64,
+}
+
+impl Servo {
+    /// Where the links are that are commanded to `joints`, in an arm whose links were behind the commanded angles by `behind`,
+    /// which is brought up to date.
+    pub(super) fn really(&self, joints: &[f64; 6], last: &mut Option<([f64; 6], [f64; 6])>) -> [f64; 6] {
+        let (before, behind) = last.unwrap_or((*joints, [0.0; 6]));
+        // A joint goes through its play before it takes the link along.
+        let behind: [f64; 6] = std::array::from_fn(|j| {
+            let half = 0.5 * self.play_rad[j];
+            (behind[j] - (joints[j] - before[j])).clamp(-half, half)
+        });
+        *last = Some((*joints, behind));
+        let [_, shoulder, elbow, wrist, ..] = *joints;
+        let upper = shoulder.cos();
+        let fore = (shoulder + elbow).cos();
+        let hand = (shoulder + elbow + wrist).sin();
+        let sag = [0.0, 0.6 * upper + 0.4 * fore, fore, hand, 0.0, 0.0];
+        std::array::from_fn(|j| {
+            let [amplitude, phase] = self.eccentric[j];
+            let given_way = if (1..=3).contains(&j) { self.sag_rad[j - 1] * sag[j] } else { 0.0 };
+            let read =
+                if self.step_rad > 0.0 { (joints[j] / self.step_rad).round() * self.step_rad } else { joints[j] };
+            read + amplitude * (joints[j] + phase).sin() + behind[j] + given_way
+        })
+    }
+}
+
 /// The arm of the data sheet.
 pub(super) fn as_stated() -> Arm {
     ArmKind::Ur5.arm()

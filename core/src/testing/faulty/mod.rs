@@ -17,7 +17,7 @@ use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::geometry::se3;
 use crate::targets::bent::{BoardPoints, BoardShape};
 
-pub use arm::LinkErrors;
+pub use arm::{LinkErrors, Servo};
 
 /// How views are taken, and what is wrong.
 #[derive(Clone)]
@@ -62,6 +62,8 @@ pub enum ArmError {
     Affine(SMatrix<f64, 6, 3>),
     /// What is wrong with every link.
     Links(LinkErrors),
+    /// What lies between the angles and the links of an arm of servo motors; it depends on where the arm came from, too.
+    Servo(Servo),
 }
 
 /// The middle of where the tip is in both set-ups, metres in the base.
@@ -126,6 +128,7 @@ impl fmt::Display for Setup {
             ArmError::None => "arm true",
             ArmError::Affine(_) => "arm affine",
             ArmError::Links(_) => "arm links",
+            ArmError::Servo(_) => "arm of servos",
         };
         let lens = if self.estimated { "lens estimated" } else { "lens given" };
         let order = if self.by_level { "by level" } else { "in no order" };
@@ -166,12 +169,12 @@ pub fn session(setup: &Setup) -> Observations {
     let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
     let cone = Cone { tilt_deg: setup.tilt_deg, roll_deg: setup.roll_deg, ..Cone::PUBLISHED };
     let (mut views, mut planned) = (Vec::with_capacity(setup.views), Vec::new());
-    let mut tries = 0;
+    let (mut tries, mut last) = (0, None);
     while views.len() < setup.views {
         tries += 1;
         assert!(tries < 100 * setup.views + 1000, "no such view is in reach");
         let next = cone.draw(&mut rng);
-        if let Some(view) = observed(setup, &mut rng, views.len(), &next) {
+        if let Some(view) = observed(setup, &mut rng, &mut last, views.len(), &next) {
             views.push(view);
             planned.push(next);
         }
@@ -190,8 +193,8 @@ pub fn session(setup: &Setup) -> Observations {
 
 /// Views with the given poses of the target in the camera; those out of sight are left out.
 pub fn session_of(setup: &Setup, planned: &[Isometry3<f64>]) -> Observations {
-    let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
-    let views = planned.iter().enumerate().filter_map(|(i, p)| observed(setup, &mut rng, i, p)).collect();
+    let (mut rng, mut last) = (ChaCha8Rng::seed_from_u64(setup.seed), None);
+    let views = planned.iter().enumerate().filter_map(|(i, p)| observed(setup, &mut rng, &mut last, i, p)).collect();
     observations(setup, views)
 }
 
@@ -207,8 +210,15 @@ fn observations(setup: &Setup, views: Vec<ObservedView>) -> Observations {
     Observations { mode: Some(setup.mode), target: BOARD, image_size: (640, 480), camera, views }
 }
 
-/// One view: the robot reports the pose planned, and is somewhere else by its noise and the faults.
-fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometry3<f64>) -> Option<ObservedView> {
+/// One view: the robot reports the pose planned, and is somewhere else by its noise and the faults. `last` is where the joints were
+/// before, and how far behind them the links.
+fn observed(
+    setup: &Setup,
+    rng: &mut ChaCha8Rng,
+    last: &mut Option<([f64; 6], [f64; 6])>,
+    index: usize,
+    planned: &Isometry3<f64>,
+) -> Option<ObservedView> {
     let (mount_from_camera, anchor_from_target) = links(setup.mode);
     let planned = Pose::from_isometry(*planned);
     let reported = base_from_tip(setup.mode, &mount_from_camera, &anchor_from_target, &planned);
@@ -231,6 +241,11 @@ fn observed(setup: &Setup, rng: &mut ChaCha8Rng, index: usize, planned: &Isometr
         ArmError::Links(errors) => {
             let joints = arm::joints_at(&arm, reported.isometry())?;
             off = off * reported.isometry().inverse() * arm::base_from_tip(&arm::with_errors(errors), &joints);
+        }
+        ArmError::Servo(servo) => {
+            let joints = arm::joints_at(&arm, reported.isometry())?;
+            let really = servo.really(&joints, last);
+            off = off * reported.isometry().inverse() * arm::base_from_tip(&arm, &really);
         }
     }
     let noise = noise_twist(rng, setup.robot_m, setup.robot_rad);

@@ -120,7 +120,7 @@ fn of_effect(model: &Model<'_>, judged: &Judged, effect: Effect) -> Hypothesis {
             let k = usize::from(off[1].abs() > off[0].abs());
             let name = ["centre_change_x", "centre_change_y"][k];
             let change = estimate(name, off[k], Some(sigma(k)), "px");
-            let (what, to_do) = lens::centre(model.sight.intrinsics, off, [sigma(0), sigma(1)]);
+            let (what, to_do) = lens::centre(model.sight.intrinsics, off, [sigma(0), sigma(1)], judged.stated_px);
             (FindingCode::WrongIntrinsics, what, to_do, change)
         }
         Effect::BoardMoved(from) | Effect::CameraMoved(from) => {

@@ -16,7 +16,7 @@ use crate::wording::{Text, shown};
 
 /// Natural logarithm of a likelihood ratio that a gross hypothesis needs after allowance for all that are tried. Of two fixed
 /// laws the wrong one is so much likelier in seven sessions in a thousand at the most (Markov's inequality).
-const CERTAIN: f64 = 5.0;
+pub(super) const CERTAIN: f64 = 5.0;
 /// One distance speaks for a set-up when it is so many times the other. It adds a sentence; nothing is decided by it.
 const FARTHER: f64 = 2.0;
 
