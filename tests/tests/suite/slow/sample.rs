@@ -8,7 +8,7 @@ use handeye_app::command::Command;
 use handeye_app::model::CellSource;
 use handeye_core::estimate::handeye::HandEye;
 use handeye_core::geometry::se3;
-use handeye_core::project::result::CalibrationResult;
+use handeye_core::project::result::{CalibrationResult, TransformEstimate};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::workbench::Workbench;
@@ -95,7 +95,7 @@ fn assert_true(result: &CalibrationResult) {
         (result.hand_eye.as_ref(), tip_from_camera.isometry(), truth.tip_from_camera.isometry()),
         (result.target.as_ref(), base_from_target.isometry(), board.isometry()),
     ] {
-        let covariance = link.and_then(|link| link.covariance_matrix()).expect("stated");
+        let covariance = link.and_then(TransformEstimate::covariance_matrix).expect("stated");
         let off = se3::log(&(found.inverse() * truth));
         let weighed = covariance.cholesky().expect("positive definite").solve(&off);
         // 99.9 % of six numbers whose stated spread is true stay below it.
