@@ -344,6 +344,7 @@ mod tests {
             OpenFolder,
             Pick,
             PointAt,
+            PrintTarget,
             RemoveTaught,
             RenameTaught,
             ReorderTaught,
