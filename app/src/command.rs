@@ -17,6 +17,7 @@ use handeye_core::project::export::ExportNames;
 use handeye_core::project::session::CaptureId;
 use handeye_core::project::taught_poses::TaughtPose;
 use handeye_core::targets::TargetSpec;
+use handeye_core::targets::print::Page;
 use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
@@ -207,6 +208,8 @@ pub enum Command {
     Redo,
     /// Another target.
     SetTarget(TargetSpec),
+    /// Write the target for a printer, on such a page.
+    PrintTarget(Page),
     /// The camera sits elsewhere.
     SetMode(Mode),
     /// What is known of the camera.

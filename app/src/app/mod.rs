@@ -207,6 +207,7 @@ impl App {
             Command::SetKeepOut(content) => self.set_keep_out(*content),
             Command::ImportKeepOut(file) => self.import_keep_out(file),
             Command::ExportKeepOut(file) => self.export_keep_out(file),
+            Command::PrintTarget(page) => self.print_target(page),
 
             Command::SetTheme(theme) => self.model.view.theme = theme,
             Command::SetLanguage(language) => self.model.view.language = language,
@@ -376,6 +377,7 @@ impl App {
         }
         self.guided_step();
         self.guided_by_hand_step();
+        self.fit_scene();
     }
 
     /// Has the settings written.

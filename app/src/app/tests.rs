@@ -17,10 +17,12 @@ use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
     ArmDoubt, ByHand, CapturePurpose, CaptureRefused, CellFacts, DepthScale, Dialog, FollowStatus, FollowWish, Home,
     Jog, Link, LinkState, LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind,
-    SolveStatus, StopOutcome, ThemeChoice, WorkBox,
+    RobotState, SceneView, SolveStatus, StopOutcome, ThemeChoice, WorkBox,
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
+use handeye_sim_link::cell::scene::{SceneChoice, ShippedScene};
+use handeye_sim_link::client::cell::ArmKinematics;
 
 pub(super) struct Bench {
     pub app: App,
@@ -542,4 +544,41 @@ fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning()
     let id = bench.app.numbers.follow.expect("it follows");
     bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
     assert_eq!(bench.app.model().messages.newest().map(|it| it.home), Some(Home::StatusLine));
+}
+
+#[test]
+fn the_view_in_3d_is_fitted_to_every_cell_once_and_then_left_as_a_person_turned_it() {
+    let facts = |scene: ShippedScene| {
+        let scene = scene.scene().and_then(|scene| scene.resolve(0)).expect("it is shipped");
+        let arm = ArmKinematics::new(scene.arm.clone(), scene.world_from_arm);
+        let state = RobotState {
+            base_from_tip: arm.tip(&scene.start_joints),
+            joints_rad: scene.start_joints,
+            ..sample_robot()
+        };
+        (CellFacts { arm: Some(arm), truth: None, ..sample::connected().cell.expect("connected") }, state)
+    };
+    let mut bench = bench(&FakeCell::new(0));
+    let (cell, robot) = facts(ShippedScene::Reference);
+    bench.app.absorb(Event::Cell(Box::new(cell)));
+    bench.app.absorb(Event::Robot(robot.clone()));
+    let first = bench.app.model().scene;
+    assert_eq!(Some(first), crate::scene::fitted_view(bench.app.model()));
+    let turned = SceneView { azimuth_rad: 1.0, distance_m: 0.5, ..first };
+    bench.app.apply(Command::SetSceneView(turned));
+    bench.app.absorb(Event::Robot(robot));
+    assert_eq!(bench.app.model().scene, turned, "a person looks at something");
+
+    bench.app.apply(Command::Connect(CellSource::BuiltIn(SceneChoice::Shipped(ShippedScene::Panda))));
+    let (cell, robot) = facts(ShippedScene::Panda);
+    bench.app.absorb(Event::Robot(robot.clone()));
+    assert_eq!(bench.app.model().scene, turned, "what it looks like is not known yet");
+    bench.app.absorb(Event::Cell(Box::new(cell)));
+    let second = bench.app.model().scene;
+    assert_eq!(Some(second), crate::scene::fitted_view(bench.app.model()));
+    assert!(second != turned && second != first, "{second:?}");
+}
+
+fn sample_robot() -> RobotState {
+    sample::connected().robot.expect("connected")
 }

@@ -1,13 +1,13 @@
 //! The view that is wanted, over the live image: an outline, an arrow from each corner of the board to where it has to go, and
 //! what to change in words.
 
-use egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
+use egui::{Align2, Color32, Painter, Pos2, Shape, Stroke};
 use handeye_core::geometry::frames::{Camera, Pose, Target};
 use handeye_core::targets::TargetSpec;
 
 use super::pane::to_do;
 use super::state::HandWaits;
-use crate::gui::style::marks::Marks;
+use crate::gui::style::marks::{self, Marks};
 use crate::live::pane::{Place, Projector, board_lines};
 use crate::model::Model;
 
@@ -42,11 +42,8 @@ pub fn paint(painter: &Painter, model: &Model, target: &TargetSpec, place: &Plac
         }
     }
     let words = to_do(hand).say(model.view.language);
-    let at = Pos2::new(place.visible.center().x, place.visible.bottom() - 22.0);
-    let galley = painter.layout_no_wrap(words, FontId::proportional(WORDS), colour);
-    let rect = Align2::CENTER_CENTER.anchor_size(at, galley.size()).expand2(Vec2::new(10.0, 5.0));
-    painter.rect_filled(rect, 6.0, Color32::from_black_alpha(190));
-    painter.galley(rect.shrink2(Vec2::new(10.0, 5.0)).min, galley, colour);
+    let at = Pos2::new(place.visible.center().x, place.visible.bottom() - 8.0);
+    marks::plate_at(painter, (Align2::CENTER_BOTTOM, at), &words, WORDS, colour);
 }
 
 fn arrow(painter: &Painter, from: Pos2, to: Pos2, colour: Color32) {

@@ -9,7 +9,7 @@ mod box_arg;
 mod calibrate;
 mod cell;
 mod doctor;
-mod driver;
+pub(crate) mod driver;
 mod export;
 mod failure;
 mod gate;

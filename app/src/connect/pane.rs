@@ -26,7 +26,7 @@ struct Draft {
     /// Where the scene there has the parts of the cell.
     objects: objects::Draft,
     /// The drivers of a robot that is driven, and of one that a person moves.
-    drivers: [drivers::pane::Draft; 2],
+    drivers: [Option<drivers::pane::Draft>; 2],
 }
 
 /// Kinds of cells.

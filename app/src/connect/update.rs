@@ -133,6 +133,7 @@ impl App {
         self.model.track.board = BoardMotion::default();
         self.model.track.board_hidden = false;
         self.model.trail = Trail::default();
+        self.model.scene_is_fitted = false;
         self.model.keep_out.standing = None;
         self.model.keep_out.unkept = None;
         self.send_target();
@@ -171,6 +172,8 @@ impl App {
             _ => {}
         }
         let is_foreign = matches!(facts.arm_doubt, Some(ArmDoubt::Foreign { .. }));
+        let had_arm = self.model.cell.as_ref().is_some_and(|before| before.arm.is_some());
+        self.model.scene_is_fitted &= had_arm == facts.arm.is_some();
         self.model.cell = Some(facts);
         // Poses that were chosen by that chain are not driven to, neither the one under way nor one that waits.
         if is_foreign && self.model.sequence.as_ref().is_some_and(|sequence| sequence.planned.is_some()) {
@@ -180,6 +183,19 @@ impl App {
         self.send_keep_out();
         self.prepare_session();
         self.send_intrinsics();
+    }
+
+    /// Looks at all that there is, once it is known what that is.
+    pub(crate) fn fit_scene(&mut self) {
+        let is_there = self.model.robot.is_some() && self.model.cell.is_some();
+        let is_recorded = !self.model.control.is_connected() && !self.model.document().captures.is_empty();
+        if !self.model.scene_is_fitted
+            && (is_there || is_recorded)
+            && let Some(view) = crate::scene::fitted_view(&self.model)
+        {
+            self.model.scene = view;
+            self.model.scene_is_fitted = true;
+        }
     }
 
     pub(crate) fn link_changed(&mut self, link: Link, state: LinkState) {

@@ -345,6 +345,7 @@ mod tests {
             OpenFolder,
             Pick,
             PointAt,
+            PrintTarget,
             RemoveTaught,
             RenameTaught,
             ReorderTaught,

@@ -16,6 +16,8 @@ mod palette;
 pub(crate) mod shell;
 pub(crate) mod signals;
 #[cfg(test)]
+mod small_window_tests;
+#[cfg(test)]
 mod snapshot_tests;
 pub(crate) mod status;
 mod steps;

@@ -422,6 +422,8 @@ fn the_board_and_the_mode_are_set_in_the_target_pane() {
     let mut silent = Silent::live();
     silent.show(Pane::Target);
     assert!(silent.sees("10 × 7 corners are 11 × 8 squares"));
+    silent.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Kind of board").click();
+    silent.steps();
     silent.click("Dots");
     silent.until("dots", |model| matches!(model.document().meta.target, TargetSpec::Circles(_)));
     assert!(silent.sees("This board looks the same after half a turn"));

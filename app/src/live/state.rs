@@ -11,6 +11,7 @@ use handeye_core::image::RgbImage;
 use handeye_core::verify::MeasuredPoint;
 use serde::{Deserialize, Serialize};
 
+use crate::scene::{AZIMUTH_RAD, ELEVATION_RAD};
 use crate::text::Text;
 
 /// What is known about a frame besides its pixels.
@@ -168,12 +169,7 @@ pub struct SceneView {
 impl Default for SceneView {
     /// Obliquely from above, with an arm of this size and what it reaches in view.
     fn default() -> Self {
-        Self {
-            centre_m: [0.0, -0.1, 0.45],
-            azimuth_rad: -35.0_f64.to_radians(),
-            elevation_rad: 22.0_f64.to_radians(),
-            distance_m: 1.9,
-        }
+        Self { centre_m: [0.0, -0.1, 0.45], azimuth_rad: AZIMUTH_RAD, elevation_rad: ELEVATION_RAD, distance_m: 1.9 }
     }
 }
 

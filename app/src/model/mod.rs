@@ -395,6 +395,8 @@ pub struct Model {
     pub viewport: Viewport,
     /// From where the 3D pane looks.
     pub scene: SceneView,
+    /// Whether that view was fitted to the cell and the session that are here.
+    pub scene_is_fitted: bool,
     /// Where the tip went.
     pub trail: Trail,
     /// The board as it is tracked, and the arm that follows it.
@@ -480,6 +482,7 @@ impl Model {
             recent: Vec::new(),
             viewport: Viewport::default(),
             scene: SceneView::default(),
+            scene_is_fitted: false,
             trail: Trail::default(),
             track: TrackState::default(),
             rerun: RerunState::default(),

@@ -10,29 +10,40 @@ use rerun::blueprint::{
 use super::scene::paths;
 use crate::model::Step;
 
+/// What is shown. Nothing stands in front that has nothing to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Arranged {
+    /// The step of the workflow.
+    pub step: Step,
+    /// Whether the camera stands beside the robot, and not on its tip.
+    pub is_beside: bool,
+    /// Whether there are joints.
+    pub has_joints: bool,
+}
+
 /// The arrangement for a step. Steps before the first capture share that of capturing, exporting that of solving.
-pub fn of(step: Step) -> Blueprint {
-    match step {
-        Step::Connect | Step::Target | Step::Capture => capture(),
-        Step::Solve | Step::Export => solve(),
-        Step::Verify => verify(),
-        Step::Track => track(),
+pub fn of(arranged: Arranged) -> Blueprint {
+    match arranged.step {
+        Step::Connect | Step::Target | Step::Capture => capture(arranged),
+        Step::Solve | Step::Export => solve(arranged),
+        Step::Verify => verify(arranged),
+        Step::Track => track(arranged),
     }
 }
 
 /// Live: what robot and camera do now.
-fn capture() -> Blueprint {
+fn capture(arranged_for: Arranged) -> Blueprint {
     let right = Vertical::new([
-        Tabs::new(live_images("Camera")).into(),
-        Tabs::new([plot("Joints", paths::PLOT_JOINTS), log()]).into(),
+        Tabs::new([live_image("Camera", arranged_for)]).into(),
+        Tabs::new(joints_and_log(arranged_for)).into(),
     ])
     .with_row_shares(vec![2.0, 1.0]);
     arranged(cell("Cell", &[]), right.into(), paths::SIM_TIMELINE)
 }
 
 /// Capture by capture: how the answer came about.
-fn solve() -> Blueprint {
-    let images = live_images("Image of the capture").into_iter().chain([selected_image()]);
+fn solve(arranged_for: Arranged) -> Blueprint {
+    let images = [live_image("Image of the capture", arranged_for), selected_image()];
     let right = Vertical::new([
         Tabs::new(images).into(),
         Tabs::new([
@@ -47,8 +58,8 @@ fn solve() -> Blueprint {
 }
 
 /// Where the calibration puts the board, against where it is seen.
-fn verify() -> Blueprint {
-    let images = live_images("Prediction in the live image").into_iter().chain([selected_image()]);
+fn verify(arranged_for: Arranged) -> Blueprint {
+    let images = [live_image("Prediction in the live image", arranged_for), selected_image()];
     let right = Vertical::new([
         Tabs::new(images).into(),
         Tabs::new([plot("Residuals [px]", "plots/residual"), report(), log()]).into(),
@@ -58,12 +69,12 @@ fn verify() -> Blueprint {
 }
 
 /// The board as it moves.
-fn track() -> Blueprint {
+fn track(arranged_for: Arranged) -> Blueprint {
     let right = Vertical::new([
-        Tabs::new(live_images("Camera")).into(),
+        Tabs::new([live_image("Camera", arranged_for)]).into(),
         plots("Position [mm]", &[paths::PLOT_TRACK_ERROR, paths::PLOT_TRACK_SIGMA]),
         plots("From image to pose [ms]", &[paths::PLOT_LATENCY]),
-        Tabs::new([plot("Joints", paths::PLOT_JOINTS), log()]).into(),
+        Tabs::new(joints_and_log(arranged_for)).into(),
     ]);
     arranged(cell("Tracking", &["- /base/captures/**"]), right.into(), paths::SIM_TIMELINE)
 }
@@ -92,16 +103,17 @@ fn lens(mode: Mode) -> String {
     paths::below(paths::camera(mode), paths::LENS)
 }
 
-/// The live image, of a camera on the tip or beside the robot: whichever there is. The one on the tip is in front.
-fn live_images(name: &str) -> [ContainerLike; 2] {
-    LENSES.map(|mode| {
-        let name = match mode {
-            Mode::EyeInHand => name,
-            Mode::EyeToHand => "Camera beside the robot",
-        };
-        let no_depth = format!("- /{}/{}", lens(mode), paths::DEPTH);
-        Spatial2DView::new(name).with_origin(lens(mode)).with_contents(["+ $origin/**".to_owned(), no_depth]).into()
-    })
+/// The live image, of the camera on the tip or beside the robot.
+fn live_image(name: &str, Arranged { is_beside, .. }: Arranged) -> ContainerLike {
+    let mode = if is_beside { Mode::EyeToHand } else { Mode::EyeInHand };
+    let no_depth = format!("- /{}/{}", lens(mode), paths::DEPTH);
+    Spatial2DView::new(name).with_origin(lens(mode)).with_contents(["+ $origin/**".to_owned(), no_depth]).into()
+}
+
+/// What the robot does, where that is known, and what was said.
+fn joints_and_log(Arranged { has_joints, .. }: Arranged) -> impl Iterator<Item = ContainerLike> {
+    let joints = has_joints.then(|| plot("Joints", paths::PLOT_JOINTS));
+    joints.into_iter().chain([log()])
 }
 
 fn selected_image() -> ContainerLike {
@@ -138,7 +150,7 @@ mod tests {
         for step in Step::ALL {
             let (rec, storage) = RecordingStreamBuilder::new("handeye-workbench").memory().expect("a recording");
             let activation = BlueprintActivation { make_active: true, make_default: true };
-            of(step).send(&rec, activation).expect("sent");
+            of(Arranged { step, is_beside: true, has_joints: false }).send(&rec, activation).expect("sent");
             rec.flush_blocking().expect("flushed");
             let is_told = |message: &LogMsg| matches!(message, LogMsg::BlueprintActivationCommand(_));
             assert!(storage.take().iter().any(is_told), "{step:?}");

@@ -9,10 +9,12 @@ use rerun::log::{ChunkBatcherConfig, LogMsg};
 use rerun::sink::{FileSink, FileSinkError, FileSinkOptions, LogSink, SinkFlushError};
 use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError};
 
+use super::blueprint::Arranged;
 use super::lasting::Recording;
 use super::scene::{RecordError, SceneWriter};
 use super::{APPLICATION_ID, Entry, arrangement, file};
 use crate::model::Step;
+use crate::scene::Extent;
 
 /// Rows of a file are gathered for so long: many small chunks make a large file, and its index a large memory.
 const FILE_TICK: Duration = Duration::from_secs(2);
@@ -74,9 +76,20 @@ pub struct Stream {
     pub file: Option<PathBuf>,
     /// Whether nothing live is written now.
     pub lasting_only: bool,
+    /// The step that is to be shown, once there was one.
     step: Option<Step>,
-    /// Steps whose arrangement it has.
-    arranged: BTreeSet<Step>,
+    /// What viewers are told to show.
+    shown: Option<Shown>,
+    /// The arrangements that it has.
+    arranged: BTreeSet<Arranged>,
+}
+
+/// What viewers are told to show.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    arranged: Arranged,
+    /// What is in sight; `None` while it is not known where anything is.
+    extent: Option<Extent>,
 }
 
 /// Why there is no stream.
@@ -134,6 +147,7 @@ impl Stream {
             file,
             lasting_only: false,
             step: None,
+            shown: None,
             arranged: BTreeSet::new(),
         })
     }
@@ -152,9 +166,11 @@ impl Stream {
     /// [`RecordError`].
     pub fn write_lasting(&mut self, entry: &Entry) -> Result<(), RecordError> {
         if let Entry::Step(step) = entry {
-            self.show(*step);
+            self.step = Some(*step);
         }
-        self.writer.write(&self.lasting, entry)
+        let written = self.writer.write(&self.lasting, entry);
+        self.show(matches!(entry, Entry::Cell(_)));
+        written
     }
 
     /// Writes something live.
@@ -162,19 +178,40 @@ impl Stream {
     /// # Errors
     /// [`RecordError`].
     pub fn write_live(&mut self, entry: &Entry) -> Result<(), RecordError> {
-        if self.lasting_only { Ok(()) } else { self.writer.write(&self.live, entry) }
+        if self.lasting_only {
+            return Ok(());
+        }
+        let written = self.writer.write(&self.live, entry);
+        // The first state of the robot says where the arm is; from then on it only moves.
+        if self.shown.is_some_and(|shown| shown.extent.is_none()) && matches!(entry, Entry::Robot { .. }) {
+            self.show(false);
+        }
+        written
     }
 
-    /// Has viewers lay out their views for a step.
-    fn show(&mut self, step: Step) {
-        if self.step == Some(step) {
+    /// Has viewers lay out their views for the step, with all of the cell in sight. What is in sight already is not moved: a
+    /// person may have turned it.
+    fn show(&mut self, is_another_cell: bool) {
+        let Some(step) = self.step else { return };
+        let arranged = self.writer.arranged(step);
+        if is_another_cell {
+            // Where its arm is, its first state says.
+            self.shown = self.shown.map(|shown| Shown { extent: None, ..shown });
+        }
+        let now = self.writer.extent();
+        let suits = |seen: &Extent| now.is_none_or(|now| seen.suits(&now));
+        let seen = self.shown.and_then(|shown| shown.extent).filter(suits);
+        let is_shown = self.shown.is_some_and(|shown| shown.arranged == arranged);
+        if is_shown && (seen.is_some() || now.is_none()) {
             return;
         }
-        self.step = Some(step);
-        match arrangement::of(step) {
-            Ok(arrangement) => arrangement.send(&self.lasting, self.arranged.insert(step)),
-            Err(error) => tracing::debug!(%error, "the layout of the viewer stays as it was"),
+        let extent = seen.or(now);
+        let sent = arrangement::of(arranged)
+            .and_then(|arrangement| arrangement.send(&self.lasting, self.arranged.insert(arranged), extent.as_ref()));
+        if let Err(error) = sent {
+            tracing::debug!(%error, "the layout of the viewer stays as it was");
         }
+        self.shown = Some(Shown { arranged, extent });
     }
 
     /// Gives it another name.
@@ -215,3 +252,7 @@ fn stream(
     let (_enabled, info, properties, batching, hooks, _blueprint) = builder.into_args();
     RecordingStream::new(info, properties, batching, hooks, Box::new(sink))
 }
+
+#[cfg(test)]
+#[path = "stream_tests.rs"]
+mod tests;

@@ -5,17 +5,21 @@
 
 mod arm;
 mod captures;
+mod extent;
 mod known;
 pub(crate) mod pane;
 
 pub use arm::{PosedArm, posed_arm};
 pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};
+pub use extent::{AZIMUTH_RAD, ELEVATION_RAD, Extent, OPENING_RAD};
 pub use known::{Known, Truth};
 
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Frame, Pose, Target, Tip};
 use handeye_core::targets::TargetSpec;
 use nalgebra::{Isometry3, Point3};
+
+use crate::model::{Model, SceneView};
 
 /// Where something is fixed.
 #[derive(Debug, Clone, Copy)]
@@ -80,6 +84,15 @@ pub enum PlannedItem {
     Camera(Pose<Base, Camera>, Intrinsics),
     /// The board on the tip.
     Board(Pose<Base, Target>, TargetSpec),
+}
+
+/// The view of all that the window shows of the cell; `None` where there is nothing.
+pub fn fitted_view(model: &Model) -> Option<SceneView> {
+    let robot = model.robot.as_ref().filter(|robot| robot.base_from_tip.is_finite());
+    let arm = robot.and_then(|robot| posed_arm(model.cell.as_ref(), &robot.base_from_tip, &robot.joints_rad));
+    let captures = model.document().captures.iter().map(|capture| &capture.base_from_tip);
+    let extent = Extent::of(&Known::of(model), arm.as_ref(), captures)?;
+    Some(SceneView { centre_m: extent.centre.into(), distance_m: extent.distance_m(), ..SceneView::default() })
 }
 
 /// The corners of the end of the pyramid that a camera sees, so far away [m], in its frame: top left, top right, bottom

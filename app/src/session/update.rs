@@ -198,6 +198,7 @@ impl App {
 
     pub(crate) fn session_opened(&mut self, exported: bool) {
         self.model.opening = false;
+        self.model.scene_is_fitted = false;
         self.model.export.is_present = exported;
         self.model.selection.clear();
         self.model.review = None;

@@ -1,3 +1,6 @@
 //! The target, the camera and where it is mounted.
 
+mod board;
+mod drawing;
 pub(crate) mod pane;
+pub(crate) mod print;

@@ -12,6 +12,8 @@ use handeye_core::project::export::{self, ExportInput, ExportNames, ExportView, 
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::{CaptureRecord, Session};
 use handeye_core::project::taught_poses::{TaughtPose, TaughtPoses};
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::print::Page;
 
 use super::link::Outlet;
 use crate::command::Event;
@@ -62,6 +64,15 @@ pub enum FileTask {
         /// Whether a person waits for it to be said.
         is_wished: bool,
     },
+    /// Write a board for a printer.
+    PrintTarget {
+        /// Which.
+        target: TargetSpec,
+        /// On which page.
+        page: Page,
+        /// Where.
+        file: PathBuf,
+    },
     /// Write the settings.
     Settings(SettingsWrite),
     /// Write taught poses.
@@ -107,6 +118,10 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
             if let Err(warning) = settings.perform() {
                 outlet.report(warning.into());
             }
+        }
+        FileTask::PrintTarget { target, page, file } => {
+            let (severity, said) = crate::target::print::write(&target, page, &file);
+            outlet.notice(severity, said);
         }
         FileTask::ReadKeepOut(file) => {
             match KeepOutFile::read(&file).and_then(|content| content.surroundings(&file).map(|_around| content)) {

@@ -41,6 +41,9 @@ impl Dictionary {
     /// The family that most `AprilTag` boards use.
     pub const APRILTAG_36H11: Self = Self(20);
 
+    /// A family with markers enough for a board on A4.
+    pub const ARUCO_5X5_100: Self = Self(5);
+
     /// All families.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..ALL.len() as u8).map(Self)

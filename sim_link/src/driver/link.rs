@@ -3,6 +3,7 @@
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::os::unix::process::CommandExt as _;
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -54,7 +55,7 @@ impl Link {
     fn start(words: &[String]) -> Result<Self, DriverError> {
         let failed = |why: String| DriverError::Start { command: words.join(" "), why };
         let (program, arguments) = words.split_first().ok_or_else(|| failed("no program is named".to_owned()))?;
-        let mut command = Command::new(program);
+        let mut command = Command::new(executable(program));
         // A group of its own: Ctrl-C in a terminal is for the workbench, which brakes the arm before it ends the driver.
         command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let family = Family::of(&mut command);
@@ -91,6 +92,16 @@ impl Link {
         }
         Err(failed(why))
     }
+}
+
+/// The name of the program that drivers come with.
+const WORKBENCH: &str = "handeye";
+
+/// What is started for the first word of a command: this program for its own name, so that the drivers that come with it are
+/// found where it is not on the `PATH`, and are of its version.
+fn executable(named: &str) -> PathBuf {
+    let own = || std::env::current_exe().ok().filter(|own| own.file_stem().is_some_and(|stem| stem == WORKBENCH));
+    Some(named).filter(|&named| named == WORKBENCH).and_then(|_| own()).unwrap_or_else(|| named.into())
 }
 
 impl LinkEnd {

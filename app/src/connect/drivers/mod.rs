@@ -3,6 +3,7 @@
 mod camera;
 mod control;
 mod motion;
+mod offered;
 pub(crate) mod pane;
 #[cfg(test)]
 mod tests;

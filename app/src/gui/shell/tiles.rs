@@ -1,6 +1,9 @@
 //! The panes in their tiles: cards with tabs that can be moved.
 
-use egui::{Color32, CornerRadius, FontId, Id, Response, Sense, Shape, Stroke, StrokeKind, Style, Ui, Vec2, Visuals};
+use egui::{
+    Color32, CornerRadius, FontId, Id, Response, Sense, Shape, Stroke, StrokeKind, Style, Ui, Vec2, Visuals,
+    style::Spacing,
+};
 use egui::{WidgetInfo, WidgetText, WidgetType};
 use egui_tiles::{Behavior, ResizeState, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 
@@ -45,13 +48,19 @@ pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mu
     if pointed != model.cursor {
         outbox.send(Command::PointAt(pointed));
     }
+    let bar = tabs_height(ui.spacing());
     let cards = layout.cards().filter_map(|id| layout.tree.tiles.rect(id)).flat_map(|rect| {
         let (radius, edge) = (CornerRadius::same(CARD_RADIUS), Stroke::new(1.0, palette.edge));
         let card = egui::epaint::RectShape::new(rect, radius, palette.card, edge, StrokeKind::Inside);
-        let line = Shape::hline(rect.x_range(), rect.top() + TABS - 0.5, edge);
+        let line = Shape::hline(rect.x_range(), rect.top() + bar - 0.5, edge);
         [Shape::from(card), line]
     });
     ui.painter().set(behind, Shape::Vec(cards.collect()));
+}
+
+/// Height of a row of tabs: fingers need more.
+fn tabs_height(spacing: &Spacing) -> f32 {
+    TABS.max(spacing.interact_size.y)
 }
 
 /// What the tiles are drawn from.
@@ -146,7 +155,7 @@ impl Behavior<Slot> for Panes<'_> {
     }
 
     fn tab_bar_height(&self, style: &Style) -> f32 {
-        TABS.max(style.spacing.interact_size.y)
+        tabs_height(&style.spacing)
     }
 
     fn gap_width(&self, _style: &Style) -> f32 {

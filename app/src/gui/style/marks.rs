@@ -1,6 +1,7 @@
 //! Colours of what is drawn over images and in charts: the same thing has the same colour in both.
 
-use egui::{Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2};
+use egui::text::LayoutJob;
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2};
 
 use super::theme::Palette;
 use handeye_core::depth::ColourMap;
@@ -105,11 +106,33 @@ pub fn of_board_row(row: usize, rows: usize) -> Color32 {
 
 /// A few words on a dark plate, readable over any image; gives where it is.
 pub fn plate(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
+    plate_at(painter, (Align2::LEFT_TOP, at), words, super::theme::CAPTION, colour)
+}
+
+/// The same with letters of a size, and with another of its corners at the point. All of the words are inside what the painter
+/// may paint on: in lines where one is too long, and moved where it would go over the edge.
+pub fn plate_at(painter: &Painter, (corner, at): (Align2, Pos2), words: &str, size: f32, colour: Color32) -> Rect {
     const INSET: Vec2 = Vec2::new(6.0, 3.0);
-    let galley = painter.layout_no_wrap(words.to_owned(), FontId::proportional(super::theme::CAPTION), colour);
-    let rect = Rect::from_min_size(at, galley.size() + 2.0 * INSET);
-    painter.rect_filled(rect, 4.0, Color32::from_black_alpha(150));
-    painter.galley(at + INSET, galley, colour);
+    /// Distance to the edge.
+    const EDGE: f32 = 4.0;
+    let room = painter.clip_rect().shrink(EDGE);
+    let mut job = LayoutJob::simple(
+        words.to_owned(),
+        FontId::proportional(size),
+        colour,
+        (room.width() - 2.0 * INSET.x).max(40.0),
+    );
+    job.halign = corner.x();
+    let galley = painter.layout_job(job);
+    let mut rect = corner.anchor_size(at, galley.size() + 2.0 * INSET);
+    // What is about something out of sight stays there with it.
+    if room.contains(at) {
+        let over = (rect.max - room.max).max(Vec2::ZERO) - (room.min - rect.min).max(Vec2::ZERO);
+        rect = rect.translate(-over);
+    }
+    painter.rect_filled(rect, 4.0, Color32::from_black_alpha(170));
+    // Lines that are centred are about the middle.
+    painter.galley(rect.min + INSET - galley.rect.min.to_vec2(), galley, colour);
     rect
 }
 

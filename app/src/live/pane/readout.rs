@@ -21,7 +21,7 @@ pub fn readout_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>) {
         } else {
             tr!(language, "Point at an image to read a pixel; the wheel zooms, a double click fits")
         };
-        ui.add(egui::Label::new(RichText::new(hint).color(palette.weak)).truncate());
+        ui.add(egui::Label::new(RichText::new(hint).color(palette.weak)).wrap());
         return;
     };
     ui.spacing_mut().item_spacing.y = 2.0;

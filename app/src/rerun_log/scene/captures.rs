@@ -7,7 +7,7 @@ use std::sync::Arc;
 use handeye_core::depth::DepthImage;
 use handeye_core::estimate::CornerResidual;
 use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Camera, Pose, Target};
+use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::geometry::planar_pose;
 use handeye_core::image::RgbImage;
 use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
@@ -55,6 +55,11 @@ pub(super) struct Changes {
 impl Captures {
     pub fn get(&self, id: CaptureId) -> Option<&Shown> {
         self.shown.get(&id)
+    }
+
+    /// Where the tip was at each.
+    pub fn tips(&self) -> impl Iterator<Item = &Pose<Base, Tip>> {
+        self.shown.values().map(|shown| &shown.record.base_from_tip)
     }
 
     /// Takes over a document. Every capture that was not there before counts one more.

@@ -33,6 +33,7 @@ mod track;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use handeye_core::estimate::handeye::Mode;
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::{CaptureId, Document};
@@ -42,8 +43,9 @@ use rerun::{RecordingStream, TextLog, TextLogLevel};
 pub use error::RecordError;
 
 use super::Entry;
-use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved};
-use crate::scene::{CameraItem, Known, Truth, posed_arm};
+use super::blueprint::Arranged;
+use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step};
+use crate::scene::{CameraItem, Extent, Known, PosedArm, Truth, posed_arm};
 use captures::Captures;
 use convert::{axes, corner_marks};
 use error::Faults;
@@ -64,6 +66,10 @@ pub struct SceneWriter {
     known: Known,
     /// The solids of the arm that are written.
     solids: Vec<(usize, Solid)>,
+    /// The arm as it was drawn last.
+    arm: Option<PosedArm>,
+    /// Whether the newest tip is of the newest cell.
+    is_placed: bool,
     /// The joints that have names in the plot.
     named_joints: Vec<JointKind>,
     session_trail: Trail,
@@ -90,6 +96,8 @@ impl SceneWriter {
             clock: Clock::default(),
             known: Known::default(),
             solids: Vec::new(),
+            arm: None,
+            is_placed: false,
             named_joints: Vec::new(),
             session_trail: Trail::new(paths::TRAJECTORY_SESSION, style::PAST_WAY),
             connection_trail: Trail::new(paths::TRAJECTORY_CONNECTION, style::WAY),
@@ -164,8 +172,23 @@ impl SceneWriter {
         }
     }
 
+    /// What of it there is to show in a step.
+    pub fn arranged(&self, step: Step) -> Arranged {
+        let has_joints = self.known.cell.as_ref().is_none_or(|cell| !cell.joints.is_empty());
+        Arranged { step, is_beside: self.known.mode() == Mode::EyeToHand, has_joints }
+    }
+
+    /// How much room all of it takes; `None` before it is known where anything is.
+    pub fn extent(&self) -> Option<Extent> {
+        // The tip of the cell before is not where the arm of this one is.
+        let is_known = self.known.cell.is_none() || self.is_placed;
+        is_known.then(|| Extent::of(&self.known, self.arm.as_ref(), self.captures.tips())).flatten()
+    }
+
     fn cell(&mut self, pen: Pen<'_>, facts: &Arc<CellFacts>) -> Result<(), RecordError> {
         self.known.cell = Some(CellFacts::clone(facts));
+        self.arm = None;
+        self.is_placed = false;
         self.known.base_from_target_true = None;
         pen.at(self.clock.now());
         self.connection_trail.restart(pen)?;
@@ -210,6 +233,7 @@ impl SceneWriter {
         joints: Option<&[f64]>,
     ) -> Result<(), RecordError> {
         let is_first = self.known.base_from_tip.replace(*base_from_tip).is_none();
+        self.is_placed = true;
         pen.frame(paths::TIP, base_from_tip.isometry(), style::LARGE_AXES)?;
         if let Some(arm) = joints.and_then(|joints| posed_arm(self.known.cell.as_ref(), base_from_tip, joints)) {
             if self.solids != arm.bodies {
@@ -217,6 +241,7 @@ impl SceneWriter {
                 self.solids.clone_from(&arm.bodies);
             }
             robot::write_arm(pen, &arm)?;
+            self.arm = Some(arm);
         }
         if is_first {
             self.truth(pen)

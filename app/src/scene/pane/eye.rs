@@ -6,9 +6,8 @@ use egui::{Pos2, Rect, Vec2};
 use nalgebra::{Point3, Vector3};
 
 use crate::model::SceneView;
+use crate::scene::OPENING_RAD;
 
-/// Angle that the shorter side of the pane takes in: narrow enough that nothing is distorted at its edges.
-const OPENING_RAD: f64 = 38.0 * std::f64::consts::PI / 180.0;
 /// What is nearer to the eye than this is cut off \[m\].
 const NEAR_M: f64 = 0.02;
 /// The eye comes no nearer to the middle than this, and goes no farther \[m\].

@@ -15,7 +15,9 @@ mod ground;
 mod legend;
 mod planned;
 
-use egui::{Align, CornerRadius, Layout, PointerButton, Pos2, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
+use egui::{
+    Align, CornerRadius, FontId, Layout, PointerButton, Pos2, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2,
+};
 use egui::{WidgetInfo, WidgetType};
 use handeye_core::project::session::CaptureId;
 
@@ -29,14 +31,15 @@ use crate::gui::style::theme::{self, Palette};
 use crate::keep_out;
 use crate::keep_out::state::with_drawn;
 use crate::model::{Model, SceneView};
+use crate::scene::fitted_view;
 use crate::text::Language;
 use crate::{text, tr};
 use canvas::Canvas;
 use captures::Spot;
 use eye::{Eye, Side};
 
-/// Height of the line over the scene.
-const HEADER: f32 = 34.0;
+/// Room above and below the controls of the line over the scene [points].
+const HEADER_MARGIN: f32 = 4.0;
 /// Distance of text to the edge of the pane.
 const INSET: f32 = 10.0;
 /// Zoom per point of wheel movement, as in the images.
@@ -54,7 +57,8 @@ pub fn scene_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     let rect = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(rect);
-    let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + HEADER));
+    let height = ui.spacing().interact_size.y + 2.0 * HEADER_MARGIN;
+    let header = Rect::from_min_max(rect.min, Pos2::new(rect.max.x, rect.min.y + height));
     let room = Rect::from_min_max(header.left_bottom(), rect.max);
     ui.painter().rect_filled(room, CornerRadius::ZERO, Palette::of(ui).well);
     let table = tables::table(ui.ctx(), model);
@@ -67,13 +71,23 @@ pub fn scene_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.scope_builder(row, |ui| header_ui(ui, model, outbox));
 }
 
+/// The view of all there is.
+fn first_view(model: &Model) -> SceneView {
+    fitted_view(model).unwrap_or_default()
+}
+
 /// Views from the sides, and back to the first one.
 fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     ui.spacing_mut().item_spacing.x = 4.0;
-    let what = tr!(language, "Show the cell as at first; so does a double click");
-    if ui.button(tr!(language, "Reset view")).on_hover_text(what).clicked() {
-        outbox.send(Command::SetSceneView(SceneView::default()));
+    let hint = if theme::is_for_fingers(ui) {
+        tr!(language, "One finger turns, two shift and zoom")
+    } else {
+        tr!(language, "Drag to turn, Shift-drag to shift, wheel to zoom")
+    };
+    let what = tr!(language, "Show arm, camera and board whole; so does a double click");
+    if ui.button(tr!(language, "Reset view")).on_hover_text(format!("{what}\n{hint}")).clicked() {
+        outbox.send(Command::SetSceneView(first_view(model)));
     }
     for side in Side::ALL {
         let (name, what) = words(side, language);
@@ -84,13 +98,12 @@ fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     keep_out::pane::header_ui(ui, model);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let hint = if theme::is_for_fingers(ui) {
-            tr!(language, "One finger turns, two shift and zoom")
-        } else {
-            tr!(language, "Drag to turn, Shift-drag to shift, wheel to zoom")
-        };
-        let hint = RichText::new(hint).size(theme::CAPTION).color(Palette::of(ui).weak);
-        ui.add(egui::Label::new(hint).truncate());
+        let font = FontId::proportional(theme::CAPTION);
+        let hint = ui.painter().layout_no_wrap(hint.to_owned(), font, Palette::of(ui).weak);
+        // Half of it says nothing.
+        if hint.size().x <= ui.available_width() {
+            ui.add(egui::Label::new(hint));
+        }
     });
 }
 
@@ -215,7 +228,7 @@ fn navigate(ui: &Ui, response: &Response, room: Rect, model: &Model, outbox: &mu
         next = if shifts { eye::panned(next, drag, room) } else { eye::orbited(next, drag) };
     }
     if response.double_clicked() {
-        next = SceneView::default();
+        next = first_view(model);
     }
     if next != now {
         outbox.send(Command::SetSceneView(next));

@@ -54,7 +54,7 @@ fn before_there_is_anything_the_pane_says_what_will_be_there() {
 }
 
 #[test]
-fn the_views_from_the_sides_and_the_first_one_are_a_click_away() {
+fn the_views_from_the_sides_and_the_one_of_everything_are_a_click_away() {
     let mut pane = pane(sample::solved());
     for (label, side) in [("Top", Side::Top), ("Front", Side::Front), ("Side", Side::Right)] {
         let expected = side.view(pane.model().scene);
@@ -62,7 +62,8 @@ fn the_views_from_the_sides_and_the_first_one_are_a_click_away() {
     }
     pane.model().scene.distance_m = 0.3;
     pane.steps();
-    assert_eq!(pane.click("Reset view"), [Command::SetSceneView(SceneView::default())]);
+    let whole = fitted_view(pane.model()).expect("there is an arm");
+    assert_eq!(pane.click("Reset view"), [Command::SetSceneView(whole)]);
 }
 
 #[test]
@@ -80,7 +81,7 @@ fn a_drag_turns_and_with_shift_or_another_button_it_shifts() {
 }
 
 #[test]
-fn the_wheel_zooms_and_a_double_click_shows_the_first_view() {
+fn the_wheel_zooms_and_a_double_click_shows_everything() {
     let mut pane = pane(sample::solved());
     let at = pane.rect(VIEW).right_bottom() - vec2(40.0, 30.0);
     pane.harness.hover_at(at);
@@ -111,7 +112,8 @@ fn the_wheel_zooms_and_a_double_click_shows_the_first_view() {
         pane.harness.step();
     }
     pane.steps();
-    assert_eq!(pane.commands().last(), Some(&Command::SetSceneView(SceneView::default())));
+    let whole = fitted_view(pane.model()).expect("there is an arm");
+    assert_eq!(pane.commands().last(), Some(&Command::SetSceneView(whole)));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 use super::{Drawing, PrintError, Shape};
 use crate::targets::TargetSpec;
@@ -27,7 +28,8 @@ const TEXT_MM: f64 = 3.5;
 const LETTER: f64 = 0.56;
 
 /// Which page to print on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Page {
     /// 210 × 297 mm, either way round.
     #[default]

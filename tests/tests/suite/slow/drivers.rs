@@ -32,6 +32,17 @@ fn the_fake_driver_passes_its_own_test_in_a_process_and_over_tcp() {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
 }
 
+/// As the window starts those of its list.
+#[test]
+fn the_drivers_that_come_with_the_program_are_started_from_it_where_it_is_not_on_the_path() {
+    let output = Command::new(handeye_binary())
+        .args(["driver", "test", "handeye driver fake"])
+        .env("PATH", "/nowhere")
+        .output()
+        .expect("handeye runs");
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output.stdout), text(&output.stderr));
+}
+
 /// As somebody does who wants to see what it says.
 #[test]
 fn a_driver_that_is_started_in_a_terminal_says_for_what_it_waits() {

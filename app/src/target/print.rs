@@ -1,0 +1,51 @@
+//! The board on paper, at its true size.
+
+use std::path::{Path, PathBuf};
+
+use handeye_core::project::files::atomic_file;
+use handeye_core::targets::TargetSpec;
+use handeye_core::targets::print::{Page, target_pdf};
+
+use crate::app::App;
+use crate::model::Severity;
+use crate::text;
+use crate::text::Text;
+use crate::worker::FileTask;
+
+/// Writes it; gives what there is to say.
+pub(crate) fn write(target: &TargetSpec, page: Page, file: &Path) -> (Severity, Text) {
+    let folder = file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|error| error.to_string());
+    let pdf = folder.and_then(|()| target_pdf(target, page).map_err(|error| error.to_string()));
+    let written = pdf.and_then(|pdf| atomic_file::write(file, &pdf).map_err(|error| error.to_string()));
+    match written {
+        Ok(()) => (
+            Severity::Info,
+            text!(
+                "{file} is written. Print it at 100 % (actual size); both rulers on it must then be 100 mm long",
+                file = file.display()
+            ),
+        ),
+        Err(why) => (Severity::Error, text!("The board was not written: {why}", why = why)),
+    }
+}
+
+/// The name of its file, which tells boards apart.
+fn file_name(target: &TargetSpec) -> String {
+    let size = match target {
+        TargetSpec::AprilTag(tag) => format!("{}", tag.id),
+        TargetSpec::AprilGrid(board) => format!("{}x{}", board.columns, board.rows),
+        _ => format!("{}x{}", target.grid().columns, target.grid().rows),
+    };
+    format!("{}_{size}.pdf", target.kind())
+}
+
+impl App {
+    /// Writes the board of the session for a printer, into the session or beside the others.
+    pub(crate) fn print_target(&mut self, page: Page) {
+        let target = self.model.document().meta.target;
+        let folder: &PathBuf = self.model.session.folder.as_ref().unwrap_or(&self.model.sessions);
+        let file = folder.join(file_name(&target));
+        let asked = self.desk.files(FileTask::PrintTarget { target, page, file });
+        self.expect(text!("The board was not written"), asked);
+    }
+}
