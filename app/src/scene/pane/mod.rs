@@ -71,7 +71,7 @@ pub fn scene_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     ui.spacing_mut().item_spacing.x = 4.0;
-    let what = tr!(language, "Show the cell as at first; so does a double click");
+    let what = tr!(language, "Reset the view; a double click does the same");
     if ui.button(tr!(language, "Reset view")).on_hover_text(what).clicked() {
         outbox.send(Command::SetSceneView(SceneView::default()));
     }
