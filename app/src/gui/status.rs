@@ -76,7 +76,7 @@ pub fn hindrance(model: &Model) -> Option<Status> {
         ),
         Simulation::Stopped | Simulation::Running => (
             text!("The simulation is stopped"),
-            text!("Images are renewed only while it runs."),
+            text!("Images are updated only while it runs."),
             Action::StartSimulation,
         ),
     };
@@ -127,7 +127,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
                 None if matches!(model.source, CellSource::Drivers(_)) => {
                     text!("The driver is started, or connected to, and has to say what it is.")
                 }
-                None => text!("Asking whether a CoppeliaSim or a cell answers there."),
+                None => text!("Checking whether CoppeliaSim or a cell answers there."),
                 Some(why) => text!("Try {attempt}. {why}", attempt = attempt, why = sentence(why)),
             };
             let title = text!("Searching for {address}…", address = address);
@@ -165,7 +165,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
             let title = match &model.source {
                 CellSource::BuiltIn(_) => text!("The built-in cell did not start"),
                 CellSource::Address(address) => text!("Cannot connect to {address}", address = address),
-                CellSource::Drivers(drivers) => text!("Cannot connect to {address}", address = drivers),
+                CellSource::Drivers(drivers) => text!("Cannot connect to {address}", address = drivers.to_string()),
             };
             status(Tone::Bad, title, sentence(why), Some(Action::Reconnect))
         }

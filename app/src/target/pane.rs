@@ -10,7 +10,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::theme::{CAPTION, Palette, Tone};
 use crate::gui::style::{form, parts};
 use crate::model::Model;
-use crate::text::Language;
+use crate::text::{Language, Text};
 use crate::{text, tr};
 
 /// Points of a board along one side: what people print.
@@ -69,7 +69,7 @@ fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             text!("Count the dots along each side; the distance is from centre to centre.")
         }
         TargetSpec::Charuco(_) | TargetSpec::AprilGrid(_) | TargetSpec::AprilTag(_) => {
-            text!("{board}. Its numbers are those of the file that it was opened from.", board = target)
+            text!("{board}. Its numbers are those of the file that it was opened from.", board = target.to_string())
         }
     };
     parts::hint_ui(ui, &hint.say(language));
@@ -150,7 +150,7 @@ fn preview_ui(ui: &mut Ui, target: &TargetSpec, room: Vec2, language: Language) 
         WidgetInfo::labeled(
             WidgetType::Image,
             true,
-            text!("Drawing of the board: {board}", board = target).say(language),
+            text!("Drawing of the board: {board}", board = target.to_string()).say(language),
         )
     });
     let Grid { columns, rows, .. } = target.grid();
@@ -277,7 +277,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         outbox.send(Command::SetCamera(Some(known)));
     }
     if let Err(error) = now.validate() {
-        form::note_ui(ui, Tone::Bad, tr!(language, "These intrinsics cannot be"), &error.to_string());
+        form::note_ui(ui, Tone::Bad, tr!(language, "These intrinsics cannot be"), &Text::from(error).say(language));
     }
 }
 
