@@ -24,7 +24,7 @@ fn without_an_answer_it_says_solve_first() {
     let mut model = model();
     model.solve.fresh = false;
     let pane = driven(model);
-    assert!(pane.sees("The answer is of earlier captures"));
+    assert!(pane.sees("The result is from earlier captures"));
     assert!(!pane.is_enabled("Export 4 formats"));
 }
 
