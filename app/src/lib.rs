@@ -38,3 +38,4 @@ pub mod verify;
 pub mod worker;
 
 pub use handeye_core::text;
+use handeye_core::wording;

@@ -16,7 +16,7 @@ use handeye_core::targets::{AprilTag, Grid, TargetSpec};
 use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ObserveError {
     /// An image of a data set could not be read.

@@ -63,6 +63,7 @@ macro_rules! tr {
 const CHINESE: &[(&str, &str)] = &[
     ("app", include_str!("../../assets/text/zh-CN/app.toml")),
     ("capture", include_str!("../../assets/text/zh-CN/capture.toml")),
+    ("errors", include_str!("../../assets/text/zh-CN/errors.toml")),
     ("export", include_str!("../../assets/text/zh-CN/export.toml")),
     ("import", include_str!("../../assets/text/zh-CN/import.toml")),
     ("frame", include_str!("../../assets/text/zh-CN/frame.toml")),

@@ -54,15 +54,83 @@ fn literal(source: &str) -> Option<String> {
     None
 }
 
-/// Every text in the sources with the places where it stands.
-fn texts() -> BTreeMap<String, PathBuf> {
+fn all_sources() -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
-    for folder in ["src", "../core/src"] {
+    for folder in ["src", "../core/src", "../sim_link/src"] {
         sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
     }
-    let mut texts = BTreeMap::new();
-    for file in files {
-        let source = std::fs::read_to_string(&file).expect("a source");
+    let read = |file: PathBuf| std::fs::read_to_string(&file).map(|source| (file, source)).expect("a source");
+    files.into_iter().map(read).collect()
+}
+
+/// The message of an error as `derive(Said)` makes a template of it: without the formats of its values.
+fn without_formats(message: &str) -> String {
+    let parts = message.split('{').enumerate();
+    let part = |(at, part): (usize, &str)| match part.split_once('}') {
+        Some((value, after)) if at > 0 => format!("{{{}}}{after}", value.split(':').next().unwrap_or_default()),
+        _ => part.to_owned(),
+    };
+    parts.map(part).collect()
+}
+
+/// Whether there is anything to translate: not in `{place}: {problem}`.
+fn has_words(text: &str) -> bool {
+    let mut rest = text.split('{');
+    let first = rest.next().unwrap_or_default();
+    let after = rest.map(|part| part.split_once('}').map_or(part, |(_, after)| after));
+    std::iter::once(first).chain(after).any(|words| words.contains(char::is_alphabetic))
+}
+
+/// The messages of errors that reach the window, with the places where they stand.
+fn errors() -> BTreeMap<String, PathBuf> {
+    let mut errors = BTreeMap::new();
+    for (file, source) in all_sources().into_iter().filter(|(_, source)| source.contains("wording::Said)]")) {
+        for (at, attribute) in source.match_indices("#[error(") {
+            let message = source[at + attribute.len()..].trim_start();
+            if message.starts_with('"')
+                && let Some(message) = literal(message)
+            {
+                errors.insert(without_formats(&message), file.clone());
+            }
+        }
+    }
+    errors
+}
+
+/// Every string in the sources of core and link: a fixed phrase of an error is one.
+fn phrases() -> BTreeSet<String> {
+    let mut phrases = BTreeSet::new();
+    for (_, source) in all_sources().iter().filter(|(file, _)| !file.starts_with(own_sources())) {
+        phrases.extend(source.match_indices('"').filter_map(|(at, _)| literal(&source[at..])));
+    }
+    phrases
+}
+
+fn own_sources() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+#[test]
+fn what_an_error_misses_or_wants_is_there_in_chinese() {
+    let mut missing = Vec::new();
+    for (file, source) in all_sources() {
+        let path = file.to_string_lossy().replace('\\', "/");
+        let is_said = ["/core/src/", "/sim_link/src/client/"].iter().any(|folder| path.contains(folder));
+        if !is_said || path.contains("tests") {
+            continue;
+        }
+        for field in ["holds: \"", "reason: \"", "want: \"", "needs: \"", "expected: \"", "problem: \""] {
+            let found = source.match_indices(field).filter_map(|(at, _)| literal(&source[at..]));
+            missing.extend(found.filter(|phrase| phrase.contains(' ') && !chinese().contains_key(phrase)));
+        }
+    }
+    assert!(missing.is_empty(), "no translation for the phrases\n{}", missing.join("\n"));
+}
+
+/// Every text in the sources with the places where it stands.
+fn texts() -> BTreeMap<String, PathBuf> {
+    let mut texts = errors();
+    for (file, source) in all_sources() {
         for macro_name in ["tr!(", "text!("] {
             for (at, _) in source.match_indices(macro_name) {
                 let before = source[..at].chars().next_back();
@@ -91,14 +159,54 @@ fn every_text_of_the_window_is_there_in_chinese_with_the_same_values() {
     let texts = texts();
     let missing: Vec<String> = texts
         .iter()
-        .filter(|(text, _)| !text.is_empty() && !chinese().contains_key(*text))
+        .filter(|(text, _)| has_words(text) && !chinese().contains_key(*text))
         .map(|(text, file)| format!("{text:?} ({})", file.file_name().unwrap_or_default().to_string_lossy()))
         .collect();
     assert!(missing.is_empty(), "no translation for:\n{}", missing.join("\n"));
+    let phrases = phrases();
     for (english, chinese) in chinese() {
         assert_eq!(placeholders(english), placeholders(chinese), "{english:?}");
-        assert!(texts.contains_key(english), "nobody says {english:?} now");
+        assert!(texts.contains_key(english) || phrases.contains(english), "nothing says {english:?} now");
     }
+}
+
+#[test]
+fn no_error_of_ours_is_passed_on_in_english() {
+    let mut found = Vec::new();
+    for (file, source) in all_sources() {
+        let path = file.to_string_lossy().replace('\\', "/");
+        if path.contains("/cli/") || path.contains("tests") {
+            continue;
+        }
+        // What a person reads is a sentence of the catalogue, in which the words of a library are a value.
+        for (at, _) in source.match_indices("verbatim(") {
+            let rest = source[at..].split([';', '\n']).next().unwrap_or_default();
+            if rest.contains(".to_string()") {
+                found.push(format!("{path}: {rest}"));
+            }
+        }
+    }
+    assert!(found.is_empty(), "use Text::from(error), or text!(\"… {{why}}\", why = error):\n{}", found.join("\n"));
+}
+
+#[test]
+fn an_error_within_errors_is_said_in_chinese_to_its_end() {
+    use handeye_core::estimate::CalibrateError;
+    use handeye_core::estimate::intrinsics::IntrinsicsError;
+    use handeye_core::geometry::camera::CameraError;
+    use handeye_sim_link::driver::{DriverError, Ending};
+
+    let source = CameraError::BehindCamera { z_m: -1.0 };
+    let error = CalibrateError::Intrinsics(IntrinsicsError::BadStart { source });
+    assert_eq!(Text::from(&error).say(Language::English), error.to_string(), "the command line says the same");
+    assert_eq!(Text::from(&error).say(Language::Chinese), "相机模型：z = -1 m 处的点不在相机前方");
+
+    let why = Ending::Silent { after: std::time::Duration::from_secs(3) };
+    let error = DriverError::Gone { driver: "a.py".to_owned(), why };
+    assert_eq!(Text::from(&error).say(Language::English), error.to_string());
+    assert_eq!(Text::from(&error).say(Language::Chinese), "驱动 `a.py` 3 s 没有应答 `ping`");
+    let failed = crate::text!("The connection could not be started: {error}", error = &error);
+    assert!(failed.say(Language::Chinese).ends_with("驱动 `a.py` 3 s 没有应答 `ping`"), "errors are values");
 }
 
 #[test]
@@ -110,4 +218,31 @@ fn every_catalogue_can_be_read_and_no_text_is_there_twice() {
             assert!(all.insert(english.clone()), "{file}: {english:?} is there twice");
         }
     }
+}
+
+/// What a README has whatever its language: levels of headings, lines of code without their comments, documents it names.
+fn skeleton(readme: &str) -> (Vec<usize>, Vec<String>, BTreeSet<&str>) {
+    let (mut headings, mut code, mut is_code) = (Vec::new(), Vec::new(), false);
+    for line in readme.lines() {
+        if line.starts_with("```") {
+            is_code = !is_code;
+        } else if is_code || line.starts_with("    ") {
+            code.push(line.split(" #").next().unwrap_or_default().trim().to_owned());
+        } else if line.starts_with('#') {
+            headings.push(line.bytes().take_while(|&byte| byte == b'#').count());
+        }
+    }
+    let links = readme.split("](").skip(1).filter_map(|part| part.split(')').next());
+    (headings, code, links.filter(|link| link.contains(".md") && link.starts_with("docs/")).collect())
+}
+
+#[test]
+fn the_chinese_readme_has_the_commands_and_the_documents_of_the_english_one() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let [english, chinese] =
+        ["README.md", "README.zh-CN.md"].map(|name| std::fs::read_to_string(root.join(name)).expect(name));
+    let (english, chinese) = (skeleton(&english), skeleton(&chinese));
+    assert_eq!(english.0, chinese.0, "headings");
+    assert_eq!(english.1, chinese.1, "commands");
+    assert_eq!(english.2, chinese.2, "documents");
 }

@@ -33,17 +33,17 @@ impl Default for Limits {
 }
 
 /// Why the reading was ended before its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum Spent {
     /// A person has cancelled it.
     #[error("cancelled")]
     Cancelled,
     /// It took longer than it may.
-    #[error("reading took longer than {} s and was stopped", .0.as_secs_f64())]
+    #[error("reading took longer than {seconds} s and was stopped", seconds = .0.as_secs_f64())]
     Time(Duration),
     /// More came out of compressed files than may.
-    #[error("its compressed files unpack to more than {:.1} GiB and reading was stopped", *.0 as f64 / f64::from(1 << 30))]
+    #[error("its compressed files unpack to more than {size:.1} GiB and reading was stopped", size = *.0 as f64 / f64::from(1 << 30))]
     Unpacked(u64),
 }
 

@@ -11,7 +11,7 @@ use crate::geometry::frames::{Camera, PointIn};
 const FAR_TOLERANCE: f32 = 1e-4;
 
 /// Why depths are not usable.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum DepthError {
     /// The number of samples is not width × height.

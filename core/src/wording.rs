@@ -4,13 +4,18 @@
 //! between threads and logged; whoever shows it has a [`Catalogue`]. What a library or the cell says in its own words
 //! stays as it is.
 //!
+//! Errors are such sentences by `derive(Said)`: `#[error("…")]` is the template. An error of another library is a value in
+//! one of them.
+//!
 //! `{n|degree|degrees}` in a template is the first word where the value of `n` is 1, and the second otherwise. A language
 //! whose nouns have one form does without.
 
 use std::borrow::Cow;
-use std::fmt::Display;
+use std::fmt;
 
 use serde::{Deserialize, Serialize, Serializer};
+
+pub use handeye_said::Said;
 
 use crate::text;
 
@@ -63,9 +68,48 @@ pub enum Value {
     Text(Text),
 }
 
-impl<T: Display> From<T> for Value {
-    fn from(value: T) -> Self {
-        Self::Plain(value.to_string())
+/// What is the same in every language. No error of ours is among these: it is a sentence, which its package translates.
+#[macro_export]
+macro_rules! plain_values {
+    ($($of:ty),* $(,)?) => {$(
+        impl From<$of> for $crate::wording::Value {
+            fn from(value: $of) -> Self {
+                Self::Plain(value.to_string())
+            }
+        }
+        impl From<&$of> for $crate::wording::Value {
+            fn from(value: &$of) -> Self {
+                Self::Plain(value.to_string())
+            }
+        }
+    )*};
+}
+
+plain_values!(String, char, f32, f64, i32, i64, i128, u8, u16, u32, u64, u128, usize);
+plain_values!(std::io::Error, std::process::ExitStatus, std::path::Display<'_>, Cow<'_, str>);
+
+impl From<&str> for Value {
+    fn from(value: &str) -> Self {
+        Self::Plain(value.to_owned())
+    }
+}
+
+impl From<&&str> for Value {
+    fn from(value: &&str) -> Self {
+        Self::Plain((*value).to_owned())
+    }
+}
+
+impl Value {
+    /// Words of ours in a sentence of ours: they are translated. A single one is a key, or the name of a method: it is not.
+    pub fn phrase(words: &'static str) -> Self {
+        if words.contains(' ') { Self::Text(Text::new(words, Vec::new())) } else { Self::Plain(words.to_owned()) }
+    }
+}
+
+impl From<&Text> for Value {
+    fn from(text: &Text) -> Self {
+        Self::Text(text.clone())
     }
 }
 
@@ -150,6 +194,13 @@ impl Text {
     /// Those of the serializer.
     pub fn serialize_english<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.say(English))
+    }
+}
+
+/// In English, as errors are logged, kept in documents and printed by the command line.
+impl fmt::Display for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.say(English))
     }
 }
 

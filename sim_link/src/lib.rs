@@ -9,3 +9,5 @@ pub mod drivers;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod wire;
+
+use handeye_core::wording;

@@ -132,7 +132,7 @@ fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
     let asked = app.model().asked.clone().expect("it waits");
     let way = crate::motion::way::Way::to(&asked.goal, app.model()).expect("connected");
     assert!(way.joint.is_some_and(|(joint, far)| joint == 0 && (far - 0.7).abs() < 1e-9));
-    assert!(way.said(app.model()).say(Language::English).contains("J1 goes farthest, by 40.1°"));
+    assert!(way.said(app.model()).say(Language::English).contains("the joint that moves most is J1, by 40.1°"));
     app.apply(Command::SkipMove);
     assert_eq!((&app.model().motion, &app.model().asked), (&Motion::Idle, &None));
 
@@ -211,5 +211,5 @@ fn without_states_nobody_says_that_the_arm_stands() {
     app.replace_model(model);
     app.absorb(Event::Stopped);
     app.absorb(Event::Tick { now_s: app.model().now_s + 2.5 });
-    assert!(said(app).contains("nobody says whether it stands"), "{}", said(app));
+    assert!(said(app).contains("it is not known whether it has"), "{}", said(app));
 }

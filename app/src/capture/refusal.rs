@@ -83,8 +83,8 @@ pub fn no_board(target: &TargetSpec) -> Why {
 /// Images come, and where the robot was is not known, for this reason.
 pub fn no_pose(why: Option<&Text>) -> Why {
     let why = match why {
-        Some(why) => text!("Where the robot was in the image is not known: {why}", why = why.clone()),
-        None => text!("Where the robot was in the image is not known"),
+        Some(why) => text!("The robot's pose for the image is not known: {why}", why = why.clone()),
+        None => text!("The robot's pose for the image is not known"),
     };
     (RefusalKind::NoImages, why)
 }

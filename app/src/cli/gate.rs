@@ -88,9 +88,9 @@ impl FromStr for Gate {
         };
         let number = Number::ALL.into_iter().find(|number| number.key() == key.trim()).ok_or_else(|| {
             let keys: Vec<&str> = Number::ALL.iter().map(|number| number.key()).collect();
-            format!("{:?} is no number of a result: take one of {}", key.trim(), keys.join(", "))
+            format!("{:?} is not a number of a result: take one of {}", key.trim(), keys.join(", "))
         })?;
-        let limit: f64 = limit.trim().parse().map_err(|_not_a_number| format!("{limit:?} is no number"))?;
+        let limit: f64 = limit.trim().parse().map_err(|_not_a_number| format!("{limit:?} is not a number"))?;
         if !limit.is_finite() {
             return Err(format!("{limit} is no limit"));
         }

@@ -235,8 +235,8 @@ fn import(
         told.note(format_args!("not written: {line}"));
     }
     told.line(format_args!(
-        "Wrote {} views to {}. Solve it with: handeye calibrate {}",
-        plan.views,
+        "Wrote {} to {}. Solve it with: handeye calibrate {}",
+        out::counted(plan.views, "view", "views"),
         folder.display(),
         folder.display()
     ));
@@ -265,7 +265,7 @@ fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Fa
         )),
         (_, Verdict::Unexplained) => {
             let why = judgement.hypotheses.first().and_then(|best| best.contradictions.first());
-            let why = why.map_or("images and poses may not belong together, or the target be another", String::as_str);
+            let why = why.map_or("images and poses may not belong together, or the target may be a different one", String::as_str);
             nothing(format!("no hypothesis explains the recording: {why}; --take N takes one all the same"))
         }
     }
@@ -311,8 +311,8 @@ fn listed(recording: &Recording, judgement: &Judgement, most: usize) -> String {
     }
     line(String::new());
     line(format!(
-        "{} hypotheses tried; the error that each leaves (median distance and angle), the best first:",
-        judgement.tried
+        "{} tried; the error that each leaves (median distance and angle), the best first:",
+        out::counted(judgement.tried, "hypothesis", "hypotheses")
     ));
     for (number, (h, conventions)) in shown.iter().zip(&all).enumerate() {
         let fit = h.fit.as_ref().map_or_else(
@@ -334,7 +334,8 @@ fn listed(recording: &Recording, judgement: &Judgement, most: usize) -> String {
                 ));
             }
             if !fit.disagreeing.is_empty() {
-                line(format!("       {} views disagree with the others", fit.disagreeing.len()));
+                let views = out::counted(fit.disagreeing.len(), "view disagrees", "views disagree");
+                line(format!("       {views} with the others"));
             }
         }
         for same in &h.same_as {
@@ -356,7 +357,7 @@ fn listed(recording: &Recording, judgement: &Judgement, most: usize) -> String {
                 .into()
         }
         Verdict::Ambiguous(count) => {
-            format!("The first {count} explain the recording; the data do not tell which is true.")
+            format!("The first {count} explain the recording; the data cannot tell which is right.")
         }
         Verdict::Unexplained => "None explains the recording.".into(),
     });
@@ -387,7 +388,7 @@ fn asked_for_mode(args: &ImportArgs) -> String {
         words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
     };
     format!(
-        "All is clear but where the camera sits, which no data tell: on the robot, or beside it with the target on the robot?\n  on \
+        "Everything is determined except where the camera is mounted, which the data cannot show: on the robot, or beside it with the target on the robot?\n  on \
          the robot:  {}\n  beside it:     {}",
         command("eye_in_hand"),
         command("eye_to_hand")

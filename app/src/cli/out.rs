@@ -148,6 +148,11 @@ fn coloured(text: &str) -> Cow<'_, str> {
     Cow::Owned(coloured)
 }
 
+/// So many of something, as a person says it: “1 view”, “2 views”.
+pub fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

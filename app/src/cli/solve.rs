@@ -71,7 +71,8 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
     let found = views.iter().filter(|view| view.corners.is_some()).count();
     tracing::info!("target found in {found} of {} images", views.len());
     if !input.seen.verification.is_empty() {
-        tracing::info!("{} captures verify the answer and are not in the fit", input.seen.verification.len());
+        let captures = out::counted(input.seen.verification.len(), "capture is", "captures are");
+        tracing::info!("{captures} for verification and not in the fit");
     }
     Ok(input)
 }
@@ -270,7 +271,7 @@ pub fn write_exports(folder: &Path, result: &CalibrationResult) -> Result<Vec<Pa
     let formats: Vec<_> =
         export::formats().iter().copied().filter(|format| export::preview(*format, &input).is_ok()).collect();
     let written = export::write_all(folder, &formats, &input).map_err(Failure::failed)?;
-    tracing::info!("wrote {} files to {}", written.len(), folder.display());
+    tracing::info!("wrote {} to {}", out::counted(written.len(), "file", "files"), folder.display());
     Ok(written)
 }
 

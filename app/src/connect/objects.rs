@@ -77,8 +77,8 @@ fn name(part: CellPart, language: Language) -> &'static str {
 }
 
 fn fault(part: CellPart, why: &BadCellPath, language: Language) -> Text {
-    let BadCellPath::Path(path) = why else { return Text::verbatim(why.to_string()) };
-    text!("{part}: {path} is no path of an object, which begins with /", part = name(part, language), path = path)
+    let BadCellPath::Path(path) = why else { return why.into() };
+    text!("{part}: {path} is not the path of an object, which begins with /", part = name(part, language), path = path)
 }
 
 #[cfg(test)]
@@ -98,7 +98,7 @@ mod tests {
         pane.click("Objects of the scene");
         pane.steps();
         pane.retype("Path: Tip (TCP)", "Panda");
-        assert!(pane.sees("is no path of an object"));
+        assert!(pane.sees("is not the path of an object"));
         assert_eq!(pane.click("Use these objects"), [], "what is no path is not sent");
         pane.retype("Path: Tip (TCP)", "/Panda/Tip");
         let wanted = CellPaths { tip: "/Panda/Tip".to_owned(), ..CellPaths::default() };

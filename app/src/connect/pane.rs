@@ -88,7 +88,7 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         });
         if let Err(error) = wanted.inner {
             let colour = Palette::of(ui).bad;
-            ui.add(Label::new(RichText::new(error.to_string()).color(colour)).wrap());
+            ui.add(Label::new(RichText::new(Text::from(error).say(language)).color(colour)).wrap());
         }
         if kind == Kind::Address {
             objects::objects_ui(ui, model, &mut draft.objects, outbox);
@@ -139,7 +139,7 @@ fn clocks_ui(ui: &mut Ui, model: &Model) {
         return;
     };
     let said = text!(
-        "Clocks: {ms} ± {uncertainty} ms are added to a time stamp of the camera to have one of the robot",
+        "Clocks: {ms} ± {uncertainty} ms are added to time stamps of the camera to convert them to the robot's clock",
         ms = format!("{:.1}", robot_from_camera_s * 1e3),
         uncertainty = format!("{:.1}", uncertainty_s * 1e3)
     );

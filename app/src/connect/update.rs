@@ -158,16 +158,14 @@ impl App {
             Some(ArmDoubt::Foreign { distance_m, angle_rad }) => self.say(
                 Severity::Warning,
                 text!(
-                    "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it, so its chain of \
-                     joints is not driven by. Look at arm and base_from_arm of the driver and at the tool that is set on the controller, \
-                     and connect again",
+                    "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it, so its chain of joints is not used. Check arm and base_from_arm of the driver and the tool that is set on the controller, and connect again",
                     distance = format!("{:.1}", distance_m * 1e3),
                     angle = format!("{:.2}", angle_rad.to_degrees())
                 ),
             ),
             None if doubted.is_some() && facts.arm.is_some() => self.say(
                 Severity::Info,
-                text!("Joints and poses of the robot belong together: Calibrate for me can drive it, once it is allowed to"),
+                text!("Joints and poses of the robot agree: Calibrate for me can move it, once it is allowed to"),
             ),
             _ => {}
         }
@@ -243,7 +241,7 @@ impl App {
     /// Lets a robot behind a driver be moved, or no longer.
     pub(crate) fn arm(&mut self, on: bool) {
         let asked = self.workers.ask_control(Request::Do(ControlTask::Arm(on)));
-        self.expect(text!("Nothing has changed about who moves the robot"), asked);
+        self.expect(text!("The permission to move the robot was not changed"), asked);
     }
 
     /// Takes the pose that the pendant shows; `None` once the robot is moved on.

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use handeye_core::project::export::ExportNames;
 use serde::{Deserialize, Serialize};
 
+use crate::text::Text;
+
 /// What is exported, and how that went.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportState {
@@ -43,7 +45,7 @@ impl Default for ExportState {
 }
 
 /// The files of a format, or why it cannot hold this result.
-pub type Preview = Result<Vec<PreviewFile>, String>;
+pub type Preview = Result<Vec<PreviewFile>, Text>;
 
 /// A file as it would be written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,5 +62,5 @@ pub struct Written {
     /// Where.
     pub folder: PathBuf,
     /// The files, or why there are none.
-    pub files: Result<Vec<PathBuf>, String>,
+    pub files: Result<Vec<PathBuf>, Text>,
 }

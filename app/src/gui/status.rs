@@ -4,7 +4,7 @@ use super::style::theme::Tone;
 pub use crate::model::STALE_AFTER_S;
 use crate::model::{CellSource, Link, LinkState, Model, Simulation};
 use crate::text;
-use crate::text::Text;
+use crate::text::{Language, Text};
 
 /// How old what is shown of the robot is, where that is not how it is now.
 pub fn robot_age(model: &Model) -> Option<Text> {
@@ -76,7 +76,7 @@ pub fn hindrance(model: &Model) -> Option<Status> {
         ),
         Simulation::Stopped | Simulation::Running => (
             text!("The simulation is stopped"),
-            text!("Images are renewed only while it runs."),
+            text!("Images are updated only while it runs."),
             Action::StartSimulation,
         ),
     };
@@ -118,7 +118,7 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
                 None => {
                     text!("A simulated arm with a depth camera over a chessboard. It needs nothing else installed.")
                 }
-                Some(why) => sentence(why),
+                Some(why) => sentence(why, model.view.language),
             };
             status(Tone::Busy, text!("Starting the built-in cell…"), detail, None)
         }
@@ -127,8 +127,8 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
                 None if matches!(model.source, CellSource::Drivers(_)) => {
                     text!("The driver is started, or connected to, and has to say what it is.")
                 }
-                None => text!("Asking whether a CoppeliaSim or a cell answers there."),
-                Some(why) => text!("Try {attempt}. {why}", attempt = attempt, why = sentence(why)),
+                None => text!("Checking whether CoppeliaSim or a cell answers there."),
+                Some(why) => text!("Try {attempt}. {why}", attempt = attempt, why = sentence(why, model.view.language)),
             };
             let title = text!("Searching for {address}…", address = address);
             status(Tone::Busy, title, detail, Some(try_now(model)))
@@ -143,9 +143,9 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         LinkState::Lost { since_s, why, attempt, next_s } => {
             let pause_s = next_s - model.now_s;
             let detail = if pause_s < SOON_S {
-                text!("{why} It is tried again in a moment.", why = sentence(why))
+                text!("{why} It is tried again in a moment.", why = sentence(why, model.view.language))
             } else {
-                let (why, number, pause) = (sentence(why), attempt + 1, duration(pause_s));
+                let (why, number, pause) = (sentence(why, model.view.language), attempt + 1, duration(pause_s));
                 text!("{why} Try {number} comes in {pause}.", why = why, number = number, pause = pause)
             };
             let title = text!("{half} lost {ago} ago", half = half, ago = duration(model.now_s - since_s));
@@ -154,20 +154,21 @@ fn of_link(model: &Model, state: &LinkState, half: Text) -> Status {
         LinkState::Retrying { since_s, why, attempt } => status(
             Tone::Warning,
             text!("{half} lost {ago} ago, retrying", half = half, ago = duration(model.now_s - since_s)),
-            text!("{why} Try {attempt} is under way.", why = sentence(why), attempt = attempt),
+            text!("{why} Try {attempt} is under way.", why = sentence(why, model.view.language), attempt = attempt),
             may_be_given_up(model).then_some(Action::StopTrying),
         ),
         LinkState::Resting { why } => {
-            let detail = text!("{why} It is not tried again until you ask for it.", why = sentence(why));
+            let detail =
+                text!("{why} It is not tried again until you ask for it.", why = sentence(why, model.view.language));
             status(Tone::Warning, text!("Not connected"), detail, Some(Action::Reconnect))
         }
         LinkState::Failed { why } => {
             let title = match &model.source {
                 CellSource::BuiltIn(_) => text!("The built-in cell did not start"),
                 CellSource::Address(address) => text!("Cannot connect to {address}", address = address),
-                CellSource::Drivers(drivers) => text!("Cannot connect to {address}", address = drivers),
+                CellSource::Drivers(drivers) => text!("Cannot connect to {address}", address = drivers.to_string()),
             };
-            status(Tone::Bad, title, sentence(why), Some(Action::Reconnect))
+            status(Tone::Bad, title, sentence(why, model.view.language), Some(Action::Reconnect))
         }
     }
 }
@@ -181,18 +182,18 @@ fn try_now(model: &Model) -> Action {
     if may_be_given_up(model) { Action::ReconnectOrStop } else { Action::Reconnect }
 }
 
-/// A reason as a sentence; those of our own are.
-fn sentence(why: &Text) -> Text {
-    why.foreign_words().map_or_else(|| why.clone(), |words| Text::verbatim(sentence_of(words)))
+/// A reason as a sentence of the window's language.
+fn sentence(why: &Text, language: Language) -> Text {
+    Text::verbatim(sentence_of(&why.say(language), if language == Language::Chinese { "。" } else { "." }))
 }
 
 /// First letter large, unless the first word is a name in code; full stop at the end.
-fn sentence_of(text: &str) -> String {
+fn sentence_of(text: &str, full_stop: &'static str) -> String {
     let is_code =
         text.split_whitespace().next().is_some_and(|word| word.trim_end_matches(['.', ':']).contains(['.', '/']));
     let mut letters = text.chars();
     let Some(first) = letters.next() else { return String::new() };
-    let end = if text.ends_with(['.', '!', '?', '…']) { "" } else { "." };
+    let end = if text.ends_with(['.', '!', '?', '…', '。']) { "" } else { full_stop };
     let first = if is_code { first.to_string() } else { first.to_uppercase().to_string() };
     format!("{first}{}{end}", letters.as_str())
 }
@@ -221,9 +222,15 @@ mod tests {
 
     #[test]
     fn a_reason_becomes_a_sentence() {
-        assert_eq!(sentence_of("nothing answers"), "Nothing answers.");
-        assert_eq!(sentence_of("Done."), "Done.");
-        assert_eq!(sentence_of("sim.getObject: no answer"), "sim.getObject: no answer.");
-        assert_eq!(sentence_of(""), "");
+        assert_eq!(sentence_of("nothing answers", "."), "Nothing answers.");
+        assert_eq!(sentence_of("Done.", "."), "Done.");
+        assert_eq!(sentence_of("sim.getObject: no answer", "."), "sim.getObject: no answer.");
+        assert_eq!(sentence_of("", "."), "");
+        let why = text!("the robot's driver has not sent a state yet");
+        assert_eq!(
+            sentence(&why, Language::English).say(Language::Chinese),
+            "The robot's driver has not sent a state yet."
+        );
+        assert_eq!(sentence(&why, Language::Chinese).say(Language::English), "机器人的驱动还没有发送状态。");
     }
 }

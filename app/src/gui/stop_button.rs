@@ -65,7 +65,7 @@ impl Face {
             words: if model.stop_pending { tr!(language, "STOPPING…") } else { name },
             fill: palette.bad,
             ink: palette.on_bad,
-            hint: tr!(language, "Have the arm stay where it is (Esc). No substitute for an emergency stop"),
+            hint: tr!(language, "Stop the arm (Esc). Not a substitute for an emergency stop"),
         }
     }
 }

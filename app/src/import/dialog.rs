@@ -56,7 +56,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     let streams = recording.streams.iter().map(of_stream);
     let tracks = recording.tracks.iter().map(of_track);
     let joints = recording.joints.iter().map(|series| {
-        text!("{count} rows of joint values in {name}", count = series.samples.len(), name = &series.name)
+        text!("{count} {count|row|rows} of joint values in {name}", count = series.samples.len(), name = &series.name)
     });
     let cameras = recording
         .cameras
@@ -65,14 +65,14 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     let targets = recording
         .targets
         .iter()
-        .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target));
+        .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target.to_string()));
     for line in streams.chain(tracks).chain(joints).chain(cameras).chain(targets) {
         ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
     }
     if let Some(looked) = found.looked.as_deref() {
         for (stream, seen, images) in &looked.seen {
             let line = text!(
-                "The target is found in {seen} of {images} images {stream}",
+                "The target is found in {seen} of {images} {images|image|images} {stream}",
                 seen = seen,
                 images = images,
                 stream = stream
@@ -94,11 +94,11 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
 fn of_stream(stream: &Stream) -> Text {
     let Stream { name, images, size: (width, height), is_depth, points } = stream;
     let line = if points.is_some() {
-        return text!("corners of {count} images in {name}", count = images.len(), name = name);
+        return text!("corners of {count} {count|image|images} in {name}", count = images.len(), name = name);
     } else if *is_depth {
-        text!("{count} depth images {name} of {width} × {height} px", count = images.len(), name = name)
+        text!("{count} depth {count|image|images} {name} of {width} × {height} px", count = images.len(), name = name)
     } else {
-        text!("{count} images {name} of {width} × {height} px", count = images.len(), name = name)
+        text!("{count} {count|image|images} {name} of {width} × {height} px", count = images.len(), name = name)
     };
     line.with("width", width).with("height", height)
 }
@@ -109,7 +109,7 @@ fn of_track(track: &Track) -> Text {
         Some(Numbers::Matrix(_)) => text!("matrices"),
         Some(Numbers::Angles(_)) | None => text!("position and three angles"),
     };
-    text!("{count} poses in {name}: {kind}", count = track.samples.len(), name = &track.name, kind = kind)
+    text!("{count} {count|pose|poses} in {name}: {kind}", count = track.samples.len(), name = &track.name, kind = kind)
 }
 
 /// The first images of what is looked at, with the pose that belongs to each by the hypothesis that is chosen.
@@ -208,7 +208,7 @@ fn arm_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Ou
 
 /// The hypotheses.
 fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
-    parts::section_ui(ui, tr!(language, "What it may mean"));
+    parts::section_ui(ui, tr!(language, "Possible interpretations"));
     if let Some(work) = import.work {
         let (said, part) = said_of(work);
         if parts::progress_ui(ui, part, &said.say(language), tr!(language, "Cancel")) {
@@ -231,13 +231,13 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         Verdict::Ambiguous(_) if judgement.is_open_in_mode_alone() => (
             Tone::Warning,
             text!(
-                "All is clear but where the camera sits, which no data tell: on the robot, or beside it? Choose it below."
+                "Everything is determined except where the camera is mounted, which the data cannot show: on the robot, or beside it? Choose it below."
             ),
         ),
         Verdict::Ambiguous(count) => (
             Tone::Warning,
             text!(
-                "{count} of {tried} explain the recording, and nothing here tells which is true: choose, or fix what you know.",
+                "{count} of {tried} explain the recording, and the data cannot tell which is right: choose one, or fix what you know.",
                 count = count,
                 tried = judgement.tried
             ),
@@ -245,7 +245,7 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         Verdict::Unexplained => (
             Tone::Bad,
             text!(
-                "None of {tried} explains the recording: images and poses may not belong together, or the target be another.",
+                "None of {tried} explains the recording: images and poses may not belong together, or the target may be a different one.",
                 tried = judgement.tried
             ),
         ),
@@ -284,7 +284,7 @@ fn time_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut O
 fn said_of(work: ImportWork) -> (Text, f32) {
     let part = |done: usize, of: usize| done as f32 / of.max(1) as f32;
     match work {
-        ImportWork::Looking(_, 0) => (text!("The files are read"), 0.0),
+        ImportWork::Looking(_, 0) => (text!("Reading the files"), 0.0),
         ImportWork::Looking(done, of) => {
             (text!("{done} of {of} images looked at", done = done, of = of), part(done, of))
         }
@@ -314,7 +314,7 @@ fn list_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language,
         if chosen && let Some(fit) = &h.fit {
             let (camera, target) = (fit.camera_at_m * 1e3, fit.target_at_m * 1e3);
             let line = text!(
-                "{views} views; the camera {camera} mm and the target {target} mm from what carries them; {off} views disagree",
+                "{views} views; the camera {camera} mm and the target {target} mm from what carries them; {off} {off|view disagrees|views disagree}",
                 views = fit.views,
                 camera = format!("{camera:.0}"),
                 target = format!("{target:.0}"),
@@ -339,7 +339,7 @@ fn list_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language,
 fn buttons_ui(ui: &mut Ui, model: &Model, import: &ImportState, language: Language, outbox: &mut Outbox) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let can = import.chosen.is_some() && import.work.is_none() && !model.opening;
-        let reason = if can { None } else { Some(tr!(language, "Choose what it means first")) };
+        let reason = if can { None } else { Some(tr!(language, "Choose an interpretation first")) };
         let button = Button::new(RichText::new(tr!(language, "Import")).strong());
         if parts::gated_ui(ui, reason, button).clicked() {
             outbox.send(Command::ConvertRecording);

@@ -10,14 +10,14 @@ use handeye_core::project::import::{
     Verdict, write,
 };
 use handeye_core::targets::{AprilTag, TargetSpec};
-use handeye_core::wording::English;
 
 use crate::observe::{self, ObserveError, Progress};
 use crate::text;
 use crate::text::Text;
+use crate::wording::Value;
 
 /// Why nothing was made of a recording.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 pub enum NotUnderstood {
     /// The files, or the choices.
     #[error(transparent)]
@@ -26,7 +26,7 @@ pub enum NotUnderstood {
     #[error(transparent)]
     Observe(#[from] ObserveError),
     /// The target is not known, or not in the images; and what to give.
-    #[error("{}", .0.say(English))]
+    #[error("{0}")]
     Target(Text),
 }
 
@@ -90,7 +90,7 @@ pub fn clocks_said(clocks: &Clocks) -> Text {
     // Two digits of the standard deviation, and no more of the offset.
     let decimals = (1.0 - sigma_ms.max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
     text!(
-        "{offset} ± {sigma} ms are added to the stamps of {count} images {images} to have them by the clock of {poses}",
+        "{offset} ± {sigma} ms are added to the stamps of {count} images {images} to convert them to the clock of {poses}",
         offset = format!("{offset_ms:.decimals$}"),
         sigma = format!("{sigma_ms:.decimals$}"),
         count = clocks.count,
@@ -188,7 +188,7 @@ impl Look<'_> {
         Err(NotUnderstood::Target(text!(
             "the files do not say which tag of {family} it is, and {images} images show {listed}: give the target as \
              kind=apriltag,tag={tag},family={family},id=N",
-            family = tag.family,
+            family = tag.family.to_string(),
             images = paths.len(),
             listed = listed,
             tag = tag.tag_m * 1e3
@@ -238,7 +238,7 @@ impl Look<'_> {
     ) -> Result<Result<(Sight, Option<FoundCamera>), Text>, NotUnderstood> {
         let stream = &self.recording.streams[i];
         let paths = self.recording.image_paths(i);
-        let trouble = |why: &dyn std::fmt::Display| text!("{name}: {why}", name = &stream.name, why = why.to_string());
+        let trouble = |why: Value| text!("{name}: {why}", name = &stream.name, why = why);
         let Some(target) = target else {
             let Some(points) = &stream.points else { return self.chessboards_in_sight(&stream.name, &paths).map(Err) };
             return Ok(Err(text!(
@@ -253,7 +253,7 @@ impl Look<'_> {
         };
         let size = match size {
             Ok(size) => size,
-            Err(why) => return Ok(Err(trouble(&why))),
+            Err(why) => return Ok(Err(trouble(why.into()))),
         };
         let (camera, note) = import::chosen_camera(self.recording, size, self.settings)?;
         self.notes.extend(note.map(Text::verbatim));
@@ -264,13 +264,13 @@ impl Look<'_> {
         } else {
             let corners = match observe::observe_images(&paths, &target, self.progress, self.cancel) {
                 Err(ObserveError::Cancelled) => return Err(ObserveError::Cancelled.into()),
-                Err(error) => return Ok(Err(trouble(&error))),
+                Err(error) => return Ok(Err(trouble(error.into()))),
                 Ok(corners) => corners,
             };
             self.seen.push((stream.name.clone(), corners.iter().flatten().count(), corners.len()));
             Sight::of_corners(target, stream.size, known, &corners)
         };
-        Ok(sight.map(|sight| (sight, camera)).map_err(|why| trouble(&why)))
+        Ok(sight.map(|sight| (sight, camera)).map_err(|why| trouble(why.into())))
     }
 
     /// Where no image shows the target: recorded poses of it need none.

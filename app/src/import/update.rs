@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use handeye_core::budget::Limits;
 use handeye_core::project::import::Settings;
+use handeye_core::targets::BadTarget;
 
 use super::state::{Converted, Found, ImportState, ImportWork};
 use super::understand;
@@ -16,6 +17,7 @@ use crate::model::{Dialog, Severity};
 use crate::session::archive::ArchiveTask;
 use crate::text;
 use crate::text::Text;
+use crate::wording::Value;
 
 impl App {
     /// Looks at what is neither a session nor a data set.
@@ -88,7 +90,7 @@ impl App {
         let mut settings = Settings::default();
         for (key, value) in &import.fixed {
             if let Err(error) = settings.set(&format!("{key}={value}")) {
-                import.trouble = Some(Text::verbatim(error.to_string()));
+                import.trouble = Some(error.into());
                 return None;
             }
         }
@@ -102,7 +104,11 @@ impl App {
         let target = match (!typed.is_empty()).then(|| of_text(typed)).transpose() {
             Ok(target) => target,
             Err(error) => {
-                import.trouble = Some(Text::verbatim(error.to_string()));
+                let why = match error.downcast::<BadTarget>() {
+                    Ok(bad) => Value::from(bad),
+                    Err(other) => Value::from(other.to_string()),
+                };
+                import.trouble = Some(text!("The target cannot be used: {why}", why = why));
                 return;
             }
         };

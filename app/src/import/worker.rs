@@ -73,7 +73,7 @@ pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
     let defect = |_panic| {
         // It must not take the thread along, nor leave a person waiting.
         tracing::error!("a recording was not read by a defect of this program: report it");
-        text!("it was not read by a defect of this program: report it")
+        text!("it was not read because of a defect of this program: please report it")
     };
     let event = match &job.task {
         ImportTask::Convert { known, hypothesis, is_taken } => {
@@ -120,7 +120,7 @@ fn said(error: NotUnderstood) -> Text {
              “handeye import --unpack”",
             size = bytes >> 30
         ),
-        error => Text::verbatim(error.to_string()),
+        error => error.into(),
     }
 }
 
@@ -195,10 +195,10 @@ fn convert(known: &Found, hypothesis: usize, is_taken: bool, number: u64, outlet
         ));
     }
     let plan = import::plan(chosen, &looked.context(judgement, settings, chosen, is_taken), None);
-    let said = |error: &dyn std::fmt::Display| Text::verbatim(error.to_string());
-    let folder = tempfile::tempdir().map_err(|e| said(&e))?;
+    let folder = tempfile::tempdir()
+        .map_err(|why| text!("There is no room for the data set on the way to a session: {why}", why = why))?;
     let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Writing(done, of) });
-    write::write(&plan, folder.path(), progress).map_err(|e| said(&e))?;
+    write::write(&plan, folder.path(), progress)?;
     let name =
         recording.root.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy().into_owned());
     Ok(Converted { folder, name, left_out: plan.left_out })

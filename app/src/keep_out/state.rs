@@ -40,7 +40,7 @@ impl KeepOut {
         let file = self.file.as_deref().unwrap_or_else(|| Path::new("keep-out boxes"));
         self.fault = content.surroundings(file).err().map(|error| match error {
             SurroundingsError::Entry { entry, fault, .. } => entry.with_fault(&fault),
-            other => Text::verbatim(other.to_string()),
+            other => other.into(),
         });
         self.around = Arc::new(content.sensible());
         self.content = content;

@@ -32,8 +32,7 @@ pub(crate) fn opened(file: Option<PathBuf>) -> (KeepOut, Option<Text>) {
         }
         Err(error) => {
             let said = text!(
-                "The arm is not kept out of the boxes of this file. It stays as it is, and boxes of now are not kept for the \
-                 next start: {error}",
+                "The arm does not keep out of the boxes of this file. The file stays as it is, and the present boxes are not kept for the next start: {error}",
                 error = error
             );
             (KeepOut { unsaved: Some(said.clone()), ..KeepOut::default() }, Some(said))

@@ -2,7 +2,6 @@
 
 use handeye_core::depth::{ColourMap, DepthSample};
 use handeye_core::targets::bent::BoardPoints;
-use handeye_core::verify::VerifyError;
 use nalgebra::Vector2;
 
 use crate::app::App;
@@ -58,11 +57,11 @@ impl App {
             let why = || Err(text!("there is no calibration yet"));
             return Some(PickedPoint { pixel, from_depth: why(), from_board: why() });
         };
-        let words = |error: VerifyError| Text::verbatim(error.to_string());
+        let words = Text::from;
         let from_depth = match frame.images.depth_at(pixel, frame.info.far_plane_m) {
             DepthSample::Metres(depth_m) => match &frame.info.base_from_tip {
                 Some(base_from_tip) => calibrated.point_at_depth(base_from_tip, &px, f64::from(depth_m)).map_err(words),
-                None => Err(text!("where the robot is is not known")),
+                None => Err(text!("the pose of the robot is not known")),
             },
             DepthSample::Far | DepthSample::Invalid => Err(text!("there is no depth at this pixel")),
         };

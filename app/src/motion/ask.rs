@@ -45,7 +45,7 @@ impl App {
             return;
         }
         if self.model.sequence_runs {
-            self.end_stop(StopOutcome::Skipped(text!("somebody left it out")));
+            self.end_stop(StopOutcome::Skipped(text!("skipped by the user")));
         }
     }
 
@@ -60,7 +60,7 @@ impl App {
     /// To where the arm stood when the cell was connected.
     pub(crate) fn go_home(&mut self) {
         let Some(home) = self.model.home else {
-            return self.say(Severity::Warning, text!("The place of the arm is not known: connect first"));
+            return self.say(Severity::Warning, text!("The position of the arm is not known: connect first"));
         };
         if self.may_set_out() {
             self.set_out(MotionGoal::Joints(home), text!("home"));

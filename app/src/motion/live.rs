@@ -178,7 +178,7 @@ impl MotionPort for LiveMotion {
             Ok(None) => Room::Enough,
             Ok(Some(place)) => Room::At(place.joints),
             Err(none) => Room::Nowhere(text!(
-                "Of {tried} places that show the whole board none has room for the arm to go along with it: move the board \
+                "Of {tried} places that show the whole board none has room for the arm to follow it: move the board \
                  away from the column of the arm, and not to the end of its reach",
                 tried = none.tried
             )),
@@ -237,7 +237,7 @@ impl MotionPort for LiveMotion {
 pub(crate) fn no_views(why: &PlanError) -> Text {
     match why {
         PlanError::StartBlocked { by } => {
-            text!("Where it stands the arm is {there}: move it into free space first", there = by.here())
+            text!("At its present place the arm is {there}: move it into free space first", there = by.here())
         }
         PlanError::TooFewViews { candidates, not_in_view, unreachable, in_the_way, no_path, .. } => text!(
             "Of {tried} views that were tried, {not_in_view} would not show the whole board, {unreachable} are out of \
@@ -249,7 +249,7 @@ pub(crate) fn no_views(why: &PlanError) -> Text {
             in_the_way = in_the_way,
             no_path = no_path
         ),
-        other => Text::verbatim(other.to_string()),
+        other => other.into(),
     }
 }
 
@@ -334,7 +334,7 @@ fn said(error: &LinkError) -> Text {
             mm = format!("{distance_mm:.2}"),
             deg = format!("{angle_deg:.2}")
         ),
-        other => Text::verbatim(other.to_string()),
+        other => other.into(),
     }
 }
 
@@ -380,7 +380,7 @@ fn obstacle_text(obstacle: &JogObstacle) -> Text {
             joint = joint
         ),
         JogObstacle::Contact(contact) => contact_text(contact),
-        other => Text::verbatim(other.to_string()),
+        other => other.into(),
     }
 }
 
@@ -392,7 +392,7 @@ pub(crate) fn contact_text(contact: &Contact) -> Text {
         }
         Contact::Itself => text!("The arm would touch itself, or what it carries: go another way"),
         Contact::Volume => text!("Tip or camera would leave the work volume: go another way"),
-        other => Text::verbatim(other.to_string()),
+        other => other.into(),
     }
 }
 

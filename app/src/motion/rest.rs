@@ -60,7 +60,7 @@ impl App {
             _ => (
                 Severity::Error,
                 text!(
-                    "The arm was told to stop, and nobody says whether it stands: no state has come since. Look at the arm"
+                    "The arm was told to stop, and it is not known whether it has: no state has come since. Look at the arm"
                 ),
             ),
         };

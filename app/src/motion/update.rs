@@ -22,8 +22,7 @@ impl App {
                 self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
             }
             Err(busy) => {
-                let why = Text::verbatim(busy.to_string());
-                self.moved(id, MotionOutcome::Failed(why));
+                self.moved(id, MotionOutcome::Failed(busy.into()));
             }
         }
     }
@@ -95,7 +94,7 @@ impl App {
                         let (what, since_s) = (text!("the next step"), self.model.now_s);
                         self.model.motion = Motion::Moving { id, what, since_s };
                     }
-                    Err(busy) => self.say_in(Pane::Jog, Severity::Warning, Text::verbatim(busy.to_string())),
+                    Err(busy) => self.say_in(Pane::Jog, Severity::Warning, busy.into()),
                 }
             }
         }

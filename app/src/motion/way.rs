@@ -57,17 +57,17 @@ impl Way {
         let way = |joint: usize, way: f64| format!("{:.1}", model.joint_kind(joint).quantity(way));
         match (self.tip, self.joint) {
             (Some((metres, radians)), Some((joint, far))) => text!(
-                "the tip goes {mm} mm and turns {deg}°; of the joints J{joint} goes farthest, by {way}",
+                "the tip moves {mm} mm and turns {deg}°; the joint that moves most is J{joint}, by {way}",
                 mm = mm(metres),
                 deg = deg(radians),
                 joint = joint + 1,
                 way = way(joint, far)
             ),
             (Some((metres, radians)), None) => {
-                text!("the tip goes {mm} mm and turns {deg}°", mm = mm(metres), deg = deg(radians))
+                text!("the tip moves {mm} mm and turns {deg}°", mm = mm(metres), deg = deg(radians))
             }
             (None, Some((joint, far))) => {
-                text!("of the joints J{joint} goes farthest, by {way}", joint = joint + 1, way = way(joint, far))
+                text!("the joint that moves most is J{joint}, by {way}", joint = joint + 1, way = way(joint, far))
             }
             (None, None) => text!("how far that is, is not known"),
         }

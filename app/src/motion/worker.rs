@@ -117,8 +117,7 @@ impl Motions {
                 outlet.notice(
                     Severity::Info,
                     text!(
-                        "Here the arm has no room to go along with the board: it moves to the nearest place where it has, \
-                         and keeps the view from there"
+                        "Here the arm has no room to follow the board: it moves to the nearest place where it has, and keeps the view from there"
                     ),
                 );
                 match port.move_to(&MotionGoal::Joints(joints), speed, cancel)? {

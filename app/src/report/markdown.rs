@@ -65,7 +65,7 @@ mod tests {
     fn the_report_says_what_is_an_outlier_and_what_the_estimate_found_out() {
         let model = sample::with_an_outlier();
         let text = markdown(model.solve.current().expect("solved"));
-        assert!(text.contains("- stated error of a point on "), "{text}");
+        assert!(text.contains("- error of a point: Student's t with "), "{text}");
         assert!(text.contains("- warning [outlier_view]: 1 outlier view"), "{text}");
         assert!(text.contains("| images/0003.png | outlier | 18.0000 px |"), "{text}");
     }

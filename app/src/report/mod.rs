@@ -178,7 +178,7 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
         out.push(format!("the corners of a view share errors of {sigma:.4} px"));
     }
     if let Some(n) = estimate.degrees_of_freedom.filter(|n| *n < 1e5) {
-        out.push(format!("stated error of a point on {n:.0} degrees of freedom"));
+        out.push(format!("error of a point: Student's t with {n:.0} degrees of freedom"));
     }
     if let Some(widening) = estimate.widening.as_ref().filter(|widening| widening.factor >= WIDENING_WORTH_SAYING) {
         let by = widening.by.replace('_', " ");

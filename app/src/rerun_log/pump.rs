@@ -96,7 +96,7 @@ impl Pump {
         self.reports.set_file(None);
         self.reports.notice(
             Severity::Warning,
-            text!("Nothing is recorded for Rerun: {error}; the session itself is safe", error = error),
+            text!("Nothing is recorded for Rerun: {error}; the session itself is safe", error = error.to_string()),
         );
     }
 
@@ -125,7 +125,7 @@ impl Pump {
         let text = text!(
             "The recording {file} ends here: {why}; the session itself is safe",
             file = path.display(),
-            why = error
+            why = error.to_string()
         );
         self.reports.notice(Severity::Warning, text);
         self.reports.set_file(None);

@@ -185,7 +185,7 @@ impl Shared {
             let now = match sink.status() {
                 GrpcSinkConnectionState::Connecting { .. } if began.elapsed() < CONNECT => ViewerState::Opening,
                 GrpcSinkConnectionState::Connecting { .. } => ViewerState::Failed(text!(
-                    "Nobody answers at {url}: start a viewer there; it is tried on",
+                    "Nothing answers at {url}: start a viewer there; the connection is tried again",
                     url = url
                 )),
                 GrpcSinkConnectionState::Connected => ViewerState::Connected { url: url.to_owned() },

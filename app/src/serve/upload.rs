@@ -81,7 +81,7 @@ impl Drop for Coming<'_> {
 }
 
 /// Why a file was not taken.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 pub enum UploadError {
     /// The path leads elsewhere or is none.
     #[error("the name of a file may not lead out of its folder")]
@@ -93,7 +93,7 @@ pub enum UploadError {
     #[error("{MOST_AT_A_TIME} files are coming already")]
     Busy,
     /// Nothing comes any more.
-    #[error("nothing came of a file for {} s", PATIENCE.as_secs())]
+    #[error("nothing came of a file for {seconds} s", seconds = PATIENCE.as_secs())]
     Stalled,
     /// The connection or the disk failed.
     #[error("a file could not be kept: {0}")]

@@ -98,7 +98,7 @@ impl App {
     pub(crate) fn set_export_names(&mut self, names: ExportNames) {
         match serde_json::to_value(&names) {
             Ok(value) => self.edit(Edit::SetExportNames(value)),
-            Err(error) => self.say(Severity::Error, Text::verbatim(error.to_string())),
+            Err(error) => self.say(Severity::Error, text!("The names cannot be kept: {why}", why = error.to_string())),
         }
         self.model.export.names = names;
         self.preview_exports();

@@ -12,6 +12,7 @@ use crate::capture::thumbnail;
 use crate::command::Event;
 use crate::model::{Observed, Severity};
 use crate::text;
+use crate::text::Text;
 use crate::worker::link::Outlet;
 
 /// Captures to look at.
@@ -46,10 +47,10 @@ fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet:
     outlet.report(Event::Observed { id, target, observed: observed.map(Arc::new) });
 }
 
-fn look(job: &ObserveJob, capture: &CaptureRecord, cancel: &CancelToken) -> Result<Observed, String> {
+fn look(job: &ObserveJob, capture: &CaptureRecord, cancel: &CancelToken) -> Result<Observed, Text> {
     let path = job.folder.join(&capture.image);
-    let rgb = handeye_core::project::files::image_file::load_rgb(&path).map_err(|error| error.to_string())?;
-    let seen = observe_image(&rgb, &job.target, cancel).map_err(|error| error.to_string())?;
+    let rgb = handeye_core::project::files::image_file::load_rgb(&path)?;
+    let seen = observe_image(&rgb, &job.target, cancel)?;
     Ok(Observed {
         corners: seen.map(|seen| seen.corners),
         image_size: rgb.dimensions(),

@@ -67,7 +67,7 @@ impl App {
             } else {
                 SolveStatus::Failed {
                     why: text!(
-                        "{seen} captures with the board are in use, at least {need} are needed: capture more poses",
+                        "{seen} {seen|capture|captures} with the board in use, at least {need} are needed: capture more poses",
                         seen = seen,
                         need = MIN_VIEWS
                     ),

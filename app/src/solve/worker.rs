@@ -19,7 +19,6 @@ use handeye_core::verify::{self, CheckCapture, Predictor, Verification, VerifyEr
 use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
 use crate::text;
-use crate::text::Text;
 use crate::truth;
 use crate::worker::link::Outlet;
 
@@ -68,9 +67,9 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
     let outcome = match solved {
         Ok(Ok(solved)) => SolveOutcome::Solved(Arc::new(Solved { took_s: outlet.now_s() - began_s, ..solved })),
         Ok(Err(CalibrateError::HandEye(HandEyeError::Cancelled))) => SolveOutcome::Cancelled,
-        Ok(Err(error)) => SolveOutcome::Failed(Text::verbatim(error.to_string())),
+        Ok(Err(error)) => SolveOutcome::Failed(error.into()),
         Err(_panic) => SolveOutcome::Failed(text!(
-            "The solver broke down on this set. The captures are safe. Please report it with the session folder"
+            "The solver crashed on these captures. They are safe. Please report it with the session folder"
         )),
     };
     outlet.report(Event::SolveEnded { job: id, outcome });

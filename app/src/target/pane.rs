@@ -10,7 +10,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::theme::{Palette, Tone};
 use crate::gui::style::{form, parts};
 use crate::model::Model;
-use crate::text::Language;
+use crate::text::{Language, Text};
 use crate::{text, tr};
 
 /// The pane.
@@ -91,7 +91,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         outbox.send(Command::SetCamera(Some(known)));
     }
     if let Err(error) = now.validate() {
-        form::note_ui(ui, Tone::Bad, tr!(language, "These intrinsics cannot be"), &error.to_string());
+        form::note_ui(ui, Tone::Bad, tr!(language, "These intrinsics cannot be"), &Text::from(error).say(language));
     }
 }
 

@@ -43,7 +43,7 @@ impl App {
     /// Joints are remembered and not the tip, because they bring the arm back on the same way.
     pub(crate) fn teach(&mut self, name: Option<String>) {
         let Some(robot) = &self.model.robot else {
-            self.say(Severity::Warning, text!("The place of the arm is not known: connect first"));
+            self.say(Severity::Warning, text!("The position of the arm is not known: connect first"));
             return;
         };
         let goal = Goal::Joints(robot.joints_rad.to_vec());

@@ -97,7 +97,7 @@ impl App {
                 self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
                 self.say(Severity::Info, text!("The arm follows the board"));
             }
-            Err(busy) => self.follow_ended(MotionOutcome::Refused(Text::verbatim(busy.to_string()))),
+            Err(busy) => self.follow_ended(MotionOutcome::Refused(busy.into())),
         }
     }
 

@@ -37,7 +37,7 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
             "The built-in cell has not answered for {seconds} s: this computer has too much to do",
             seconds = after.as_secs()
         ),
-        other => Text::verbatim(other.to_string()),
+        other => other.into(),
     };
     match error {
         LinkError::BadEndpoint { .. } => PortError::Hopeless(text),

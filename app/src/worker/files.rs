@@ -24,6 +24,7 @@ use crate::model::{
 };
 use crate::settings::SettingsWrite;
 use crate::text;
+use crate::text::Text;
 
 /// What can be asked for.
 pub enum FileTask {
@@ -165,16 +166,16 @@ fn review(folder: &Path, capture: &CaptureRecord, colours: ColourMap, outlet: &O
     }
 }
 
-fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<FrameImages, String> {
-    let session = Session::open(folder).map_err(|error| error.to_string())?;
-    let rgb = session.load_rgb(capture).map_err(|error| error.to_string())?;
-    let depth = session.load_depth_m(capture).map_err(|error| error.to_string())?;
+fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<FrameImages, Text> {
+    let session = Session::open(folder)?;
+    let rgb = session.load_rgb(capture)?;
+    let depth = session.load_depth_m(capture)?;
     let coloured = |metres: DepthImage| {
         // A recorded depth has its far plane in it: nothing lies behind.
         let far_plane_m = metres.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
         let [near_m, far_m] = depth::range_of(&metres, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
-        let colours = metres.colours(colours, near_m, far_m, far_plane_m).map_err(|error| error.to_string())?;
-        Ok::<_, String>(ColouredDepth { metres, colours })
+        let colours = metres.colours(colours, near_m, far_m, far_plane_m)?;
+        Ok::<_, Text>(ColouredDepth { metres, colours })
     };
     Ok(FrameImages { rgb, depth: depth.map(coloured).transpose()? })
 }
@@ -230,25 +231,21 @@ pub fn kind_of(folder: &Path) -> FolderKind {
     }
 }
 
-fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, String>)> {
+fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, Text>)> {
     export::formats()
         .iter()
         .map(|format| {
             let files = export::preview(*format, &job.input())
-                .map_err(|error| error.to_string())
+                .map_err(Text::from)
                 .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());
             (format.name().to_owned(), files)
         })
         .collect()
 }
 
-fn write(job: &ExportJob, formats: &[String], folder: &Path) -> Result<Vec<PathBuf>, String> {
-    let formats: Vec<&dyn Format> = formats
-        .iter()
-        .map(|name| export::by_name(name))
-        .collect::<Result<_, _>>()
-        .map_err(|error| error.to_string())?;
-    export::write_all(folder, &formats, &job.input()).map_err(|error| error.to_string())
+fn write(job: &ExportJob, formats: &[String], folder: &Path) -> Result<Vec<PathBuf>, Text> {
+    let formats: Vec<&dyn Format> = formats.iter().map(|name| export::by_name(name)).collect::<Result<_, _>>()?;
+    Ok(export::write_all(folder, &formats, &job.input())?)
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Connections to a cell over the remote API; starts the built-in cell when it is the one to connect to.
 
-use std::fmt::Display;
 use std::sync::{Mutex, PoisonError};
 
 use handeye_sim_link::cell::scene::SceneChoice;
@@ -14,7 +13,6 @@ use super::cell_error::{check, check_arm, port_error};
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, Newest, PortError, RawFrame};
 use crate::model::{BoardMotion, CellFacts, RobotState, Simulation};
 use crate::motion::live::LiveMotion;
-use crate::text::Text;
 
 /// Connects to the cell that the window was started for.
 pub struct LiveConnector {
@@ -55,7 +53,7 @@ impl LiveConnector {
                 }
             }
         };
-        address.parse().map_err(|error: BadEndpoint| PortError::Hopeless(Text::verbatim(error.to_string())))
+        address.parse().map_err(|error: BadEndpoint| PortError::Hopeless(error.into()))
     }
 
     /// Makes one connection.
@@ -222,7 +220,6 @@ impl CameraPort for LiveCamera {
 }
 
 fn start_built_in(scene: &SceneChoice) -> Result<CellServer, PortError> {
-    let hopeless = |error: &dyn Display| PortError::Hopeless(Text::verbatim(error.to_string()));
-    let scene = scene.load().map_err(|error| hopeless(&error))?;
-    CellServer::start(CellConfig::new(scene)).map_err(|error| hopeless(&error))
+    let scene = scene.load().map_err(|error| PortError::Hopeless(error.into()))?;
+    CellServer::start(CellConfig::new(scene)).map_err(|error| PortError::Hopeless(error.into()))
 }

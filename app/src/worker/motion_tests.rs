@@ -371,7 +371,7 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
         Event::Notice { text, .. } => Some(text.say(Language::English)),
         _ => None,
     });
-    assert!(said.contains("no room to go along with the board"), "{said}");
+    assert!(said.contains("no room to follow the board"), "{said}");
     bench.moved(3);
     assert_eq!(cell.script().moved, [MotionGoal::Joints(joints.into())]);
     let why = Text::verbatim("the board is at the column");

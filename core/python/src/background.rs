@@ -54,7 +54,7 @@ pub fn run<T: Send>(
                 Err(RecvTimeoutError::Timeout) => py.check_signals(),
                 Err(RecvTimeoutError::Disconnected) => {
                     let _panic = worker.join();
-                    let message = "the solver broke down on this set: please report it with the data";
+                    let message = "the solver crashed on this set: please report it with the data";
                     return Err(PyRuntimeError::new_err(message).into());
                 }
             };

@@ -5,7 +5,7 @@ use crate::progress::CancelToken;
 /// Why there is no detection.
 ///
 /// A board that is simply not in the image is not an error: [`detect`](super::detect) returns `None`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum VisionError {
     /// The target cannot be looked for.

@@ -18,6 +18,8 @@ use super::handeye::{HandEyeError, PosePair, subset};
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::statistics::median;
 use crate::progress::CancelToken;
+use crate::text;
+use crate::wording::Text;
 
 /// Stamps of one clock \[s\], and poses at them.
 pub type Stream<Dst, Src> = [(f64, Pose<Dst, Src>)];
@@ -32,11 +34,11 @@ pub struct ClockOffset {
 }
 
 /// Why no offset can be told.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ClockOffsetError {
     /// Too short.
-    #[error("{got} poses of the {whose} are too few to tell the offset of its clock, at least {need} are needed")]
+    #[error("{got} poses of the {whose} are too few to tell the offset of its clock, at least {need} are needed", whose = named(whose))]
     TooFew {
         /// Of what.
         whose: &'static str,
@@ -47,7 +49,8 @@ pub enum ClockOffsetError {
     },
     /// Stamps that stand still, go back or are none.
     #[error(
-        "stamps of the {whose} do not rise at entry {entry}, counted from 0: sort them, and leave doubled ones out"
+        "stamps of the {whose} do not rise at entry {entry}, counted from 0: sort them, and leave doubled ones out",
+        whose = named(whose)
     )]
     NotRising {
         /// Of what.
@@ -84,6 +87,14 @@ pub enum ClockOffsetError {
     /// No links could be found at any offset.
     #[error(transparent)]
     HandEye(#[from] HandEyeError),
+}
+
+fn named(whose: &str) -> Text {
+    match whose {
+        "camera" => text!("camera"),
+        "robot" => text!("robot"),
+        other => Text::verbatim(other),
+    }
 }
 
 /// Poses of a stream that are needed. Six numbers each, less the thirteen of two links and the offset, leave a hundred degrees

@@ -208,7 +208,7 @@ pub struct TargetSize {
 }
 
 /// Why there is no calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum CalibrateError {
     /// The target was not found in enough images.
@@ -228,8 +228,8 @@ pub enum CalibrateError {
     },
     /// Views were left out of the fit by the caller, and the rest is too few.
     #[error(
-        "{left} views with the target in sight are left in the fit and {excluded} are excluded, at least {need} are \
-         needed: take views back in or capture more"
+        "views with the target in sight: {left} in the fit and {excluded} excluded, at least {need} are needed; take \
+         views back in or capture more"
     )]
     TooFewLeft {
         /// Views with the target that take part.
@@ -249,7 +249,7 @@ pub enum CalibrateError {
     #[error(transparent)]
     HandEye(#[from] HandEyeError),
     /// The robot turned about one axis only: five of the six numbers of the hand-eye transform, and which one is open.
-    #[error("{0}")]
+    #[error("{found}", found = .0.text())]
     OneAxis(Box<PartialHandEye>),
     /// A view of a hand-eye set has no robot pose.
     #[error("view {name:?} has no robot pose")]

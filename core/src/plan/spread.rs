@@ -11,7 +11,6 @@ use crate::geometry::arm::JointValues;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::targets::TargetSpec;
-use crate::wording::English;
 
 /// Directions in which a board goes that may be elsewhere at once; between two of them it goes no farther out of the image than by
 /// 8 % of the way.
@@ -89,7 +88,7 @@ pub struct PlannedView {
 }
 
 /// Why there are not enough views.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum PlanError {
     /// Fewer views than asked for fit the cell.
@@ -116,7 +115,7 @@ pub enum PlanError {
         no_path: usize,
     },
     /// Even the configuration to start from is not free.
-    #[error("in the configuration to start from the arm is {}: move it into free space first", by.here().say(English))]
+    #[error("in the configuration to start from the arm is {there}: move it into free space first", there = by.here())]
     StartBlocked {
         /// What it is too near to.
         by: Contact,

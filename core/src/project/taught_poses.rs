@@ -38,6 +38,8 @@ use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
 use crate::targets::TargetSpec;
+use crate::text;
+use crate::wording::Text;
 
 /// What `format` says.
 pub const FORMAT: &str = "handeye-poses";
@@ -173,8 +175,8 @@ pub struct MotionLimits {
 }
 
 /// What is wrong with a pose file, in one line: `FILE, row N, pose "NAME": what`.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}{}: {problem}", file.display(), At(", row ", row.as_ref()), At(", pose ", pose.as_ref()))]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[error("{place}: {problem}", place = place(file, *row, pose.as_deref()))]
 #[non_exhaustive]
 pub struct PosesError {
     /// The file.
@@ -187,11 +189,13 @@ pub struct PosesError {
     pub problem: PosesProblem,
 }
 
-struct At<'a, T>(&'static str, Option<&'a T>);
-
-impl<T: std::fmt::Display> std::fmt::Display for At<'_, T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.1.map_or(Ok(()), |value| write!(f, "{}{value}", self.0))
+fn place(file: &Path, row: Option<usize>, pose: Option<&str>) -> Text {
+    let file = file.display();
+    match (row, pose) {
+        (None, None) => text!("{file}", file = file),
+        (Some(row), None) => text!("{file}, row {row}", file = file, row = row),
+        (None, Some(pose)) => text!("{file}, pose {pose}", file = file, pose = pose),
+        (Some(row), Some(pose)) => text!("{file}, row {row}, pose {pose}", file = file, row = row, pose = pose),
     }
 }
 
@@ -203,7 +207,7 @@ impl PosesError {
 }
 
 /// A defect of a pose file.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum PosesProblem {
     /// The file system does not give it.

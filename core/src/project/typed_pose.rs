@@ -58,11 +58,11 @@ impl TypedRotation {
 }
 
 /// Why a text is no pose in its convention.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum TypedPoseError {
     /// A word that is no number.
-    #[error("{word:?} is no number")]
+    #[error("{word:?} is not a number")]
     NoNumber {
         /// The word.
         word: String,
@@ -94,7 +94,7 @@ pub enum TypedPoseError {
         length: f64,
     },
     /// No rotation matrix.
-    #[error("the first three columns are no rotation: check that the numbers are given row by row")]
+    #[error("the first three columns are not a rotation: check that the numbers are given row by row")]
     NoRotation,
 }
 

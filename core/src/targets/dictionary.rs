@@ -82,7 +82,7 @@ impl Dictionary {
 }
 
 /// A family that is not known.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
 #[error("marker family {0:?} is not known: it is one of {list}", list = names())]
 pub struct UnknownDictionary(pub String);
 

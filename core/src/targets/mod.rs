@@ -70,7 +70,7 @@ impl Grid {
 }
 
 /// A number of a target that cannot be.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[error("{key} = {value} is not usable: it must be {want}")]
 pub struct BadTarget {
     /// Which, as a data set calls it.

@@ -5,7 +5,7 @@ use crate::detect::VisionError;
 use crate::geometry::camera::CameraError;
 
 /// Why there is no tracker, or no update. A board that is not in the image is not an error.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum TrackError {
     /// The intrinsics cannot be computed with.
@@ -40,7 +40,7 @@ pub enum TrackError {
         value: f64,
     },
     /// The time of an image is not a number.
-    #[error("the time of the image is {time_s} s, which is no time")]
+    #[error("the time of the image is {time_s} s, which is not a valid time")]
     BadTime {
         /// Its value \[s\].
         time_s: f64,

@@ -28,7 +28,7 @@ pub use consistency::Consistency;
 pub use points::MeasuredPoint;
 
 /// Why there is nothing to verify with.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum VerifyError {
     /// The calibration is of a camera alone.
@@ -76,7 +76,7 @@ pub enum VerifyError {
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// A depth that is none.
-    #[error("{depth_m} m is no depth: choose a pixel with a measurement")]
+    #[error("{depth_m} m is not a valid depth: choose a pixel with a measurement")]
     BadDepth {
         /// The depth given, metres.
         depth_m: f64,

@@ -21,7 +21,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 const MAX_SIDE: f64 = 16384.0;
 
 /// A value of the simulator that means nothing.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ConvertError {
     /// A number is infinite or not a number.

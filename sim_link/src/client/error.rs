@@ -9,9 +9,11 @@ use super::convert::ConvertError;
 use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
 use crate::wire::{MAX_MESSAGE_BYTES, MAX_REPLY_BYTES, WireError};
+use handeye_core::text;
+use handeye_core::wording::Text;
 
 /// Why a call, or a task made of calls, has no result. Each message says what to do next.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum LinkError {
     /// The address cannot be used.
@@ -78,7 +80,7 @@ pub enum LinkError {
         call: String,
     },
     /// The server answered with an error.
-    #[error("{call} failed in the simulator: {}", without_place(message))]
+    #[error("{call} failed in the simulator: {said}", said = without_place(message))]
     Remote {
         /// Which call.
         call: String,
@@ -97,7 +99,7 @@ pub enum LinkError {
         reply: String,
     },
     /// The reply is not a message.
-    #[error("{call}: the reply cannot be read: {source}; {}", advice_on_bytes(*.has_spoken))]
+    #[error("{call}: the reply cannot be read: {source}; {advice}", advice = advice_on_bytes(*has_spoken))]
     Malformed {
         /// Which call.
         call: String,
@@ -108,9 +110,10 @@ pub enum LinkError {
     },
     /// The reply is longer than anything that is read.
     #[error(
-        "{call}: the reply {}, over the limit of {} MiB; ask for less, for images by a lower resolution of the sensor",
-        length(.bytes.as_ref()),
-        MAX_MESSAGE_BYTES >> 20
+        "{call}: the reply {length}, over the limit of {limit} MiB; ask for less, for images by a lower resolution of the \
+         sensor",
+        length = length(bytes.as_ref()),
+        limit = MAX_MESSAGE_BYTES >> 20
     )]
     ReplyTooLarge {
         /// Which call.
@@ -154,8 +157,10 @@ pub enum LinkError {
     },
     /// The scene lacks an object.
     #[error(
-        "the scene has no {path} ({}){}: open the cell's scene, or say where this one has it by the object path {:?}",
-        part.what(), listed(*part, there), part.key()
+        "the scene has no {path} ({what}){listed}: open the cell's scene, or say where this one has it by the object path \"{key}\"",
+        what = part.what(),
+        listed = listed(*part, there),
+        key = part.key()
     )]
     NoSuchObject {
         /// The path asked for.
@@ -167,9 +172,9 @@ pub enum LinkError {
     },
     /// An arm with more joints than are driven.
     #[error(
-        "{count} joints carry the tip and at most {} are driven; set the object path \"arm\" to the object that its first \
+        "{count} joints carry the tip and at most {most} are driven; set the object path \"arm\" to the object that its first \
          joint hangs on",
-        handeye_core::geometry::arm::MAX_JOINTS
+        most = handeye_core::geometry::arm::MAX_JOINTS
     )]
     TooManyJoints {
         /// Joints between base and tip.
@@ -186,7 +191,7 @@ pub enum LinkError {
     },
     /// The server answers, but what a task waits for does not come.
     #[error(
-        "{task}: waited {after:.1?} for {awaited}, in vain; look at the simulator, and start the simulation again if its \
+        "{task}: waited {after:.1?} for {awaited} without success; look at the simulator, and start the simulation again if its \
          time does not go on"
     )]
     WaitedTooLong {
@@ -198,10 +203,7 @@ pub enum LinkError {
         after: Duration,
     },
     /// The simulation does not run, so nothing would move and no image would be new.
-    #[error("{task}: the simulation is {}", match state {
-        SimulationState::Paused => "paused; continue it first",
-        SimulationState::Stopped | SimulationState::Running => "stopped; start it first",
-    })]
+    #[error("{task}: the simulation is {state}", state = standing(*state))]
     NotRunning {
         /// What was asked for.
         task: &'static str,
@@ -375,23 +377,35 @@ fn without_place(message: &str) -> &str {
 }
 
 /// What of that kind the scene has.
-fn listed(part: CellPart, there: &[String]) -> String {
-    if there.is_empty() { String::new() } else { format!("; its {} are {}", part.kind().1, there.join(", ")) }
+fn listed(part: CellPart, there: &[String]) -> Text {
+    if there.is_empty() {
+        return Text::default();
+    }
+    text!("; its {kind} are {there}", kind = part.kind().1, there = there.join(", "))
 }
 
-fn advice_on_bytes(has_spoken: bool) -> &'static str {
-    if has_spoken {
-        "the server has broken it off: CoppeliaSim's remote API does so with some maps; try again, and if it comes back \
-         report the call to the maker of the server"
-    } else {
-        "is this the port of the ZMQ remote API (usually 23000)?"
+fn standing(state: SimulationState) -> Text {
+    match state {
+        SimulationState::Paused => text!("paused; continue it first"),
+        SimulationState::Stopped | SimulationState::Running => text!("stopped; start it first"),
     }
 }
 
-fn length(bytes: Option<&usize>) -> String {
+fn advice_on_bytes(has_spoken: bool) -> Text {
+    if has_spoken {
+        text!(
+            "the server has broken it off: CoppeliaSim's remote API does so with some maps; try again, and if it comes back \
+             report the call to the maker of the server"
+        )
+    } else {
+        text!("is this the port of the ZMQ remote API (usually 23000)?")
+    }
+}
+
+fn length(bytes: Option<&usize>) -> Text {
     match bytes {
-        Some(bytes) => format!("has {bytes} bytes"),
-        None => format!("has more than {} MiB, or breaks the rules of ZeroMQ", MAX_REPLY_BYTES >> 20),
+        Some(bytes) => text!("has {bytes} bytes", bytes = bytes),
+        None => text!("has more than {limit} MiB, or breaks the rules of ZeroMQ", limit = MAX_REPLY_BYTES >> 20),
     }
 }
 

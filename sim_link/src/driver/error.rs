@@ -1,6 +1,5 @@
 //! Why a driver does not do what it is asked for.
 
-use std::fmt;
 use std::time::Duration;
 
 use super::message::Ability;
@@ -8,7 +7,7 @@ use super::spec::BadSpec;
 use super::wire::WireError;
 
 /// Why a driver does not do what it is asked for. Each names the driver.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum DriverError {
     /// The text names none.
@@ -55,7 +54,7 @@ pub enum DriverError {
         why: String,
     },
     /// Motion is not allowed.
-    #[error("the driver `{driver}` is read-only{}: allow it to move the arm first", since(why.as_ref()))]
+    #[error("the driver `{driver}` is read-only{since}: allow it to move the arm first", since = since(why.as_ref()))]
     NotArmed {
         /// Its command or address.
         driver: String,
@@ -79,7 +78,7 @@ pub enum DriverError {
         why: String,
     },
     /// A request was not answered in time. The connection is closed where the arm might move.
-    #[error("the driver `{driver}` has not answered {what} within {} s", after.as_secs_f64())]
+    #[error("the driver `{driver}` has not answered {what} within {seconds} s", seconds = after.as_secs_f64())]
     NoAnswer {
         /// Its command or address.
         driver: String,
@@ -102,10 +101,11 @@ impl DriverError {
 }
 
 /// How a connection to a driver ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum Ending {
     /// The process ended by itself.
+    #[error("ended ({status}){last}", last = last(last_line.as_ref()))]
     Exited {
         /// Its exit status, in the words of the system.
         status: String,
@@ -113,15 +113,19 @@ pub enum Ending {
         last_line: Option<String>,
     },
     /// It closed its output, or the connection.
+    #[error("closed the connection{last}", last = last(last_line.as_ref()))]
     Closed {
         /// The last line that it printed to standard error.
         last_line: Option<String>,
     },
     /// It sent something that breaks the protocol.
+    #[error("broke the protocol: {0}")]
     Broken(WireError),
     /// It said that it cannot go on.
+    #[error("gave up: {0}")]
     Said(String),
     /// No answer to `hello`.
+    #[error("has not answered `hello` within {seconds} s{last}", seconds = after.as_secs_f64(), last = last(last_line.as_ref()))]
     NoHello {
         /// How long was waited.
         after: Duration,
@@ -129,33 +133,23 @@ pub enum Ending {
         last_line: Option<String>,
     },
     /// No answer to pings.
+    #[error("has not answered a `ping` for {seconds} s", seconds = after.as_secs_f64())]
     Silent {
         /// For how long.
         after: Duration,
     },
     /// It does not read what it is sent.
+    #[error("does not read what it is sent")]
     NotReading,
     /// It did not stop a motion when it was told to.
+    #[error("did not come to rest after `stop`; the connection was closed")]
     DoesNotStop,
     /// This program closed it.
+    #[error("was closed")]
     ClosedHere,
 }
 
-impl fmt::Display for Ending {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let last = |line: &Option<String>| line.as_ref().map(|line| format!(": {line}")).unwrap_or_default();
-        match self {
-            Self::Exited { status, last_line } => write!(f, "ended ({status}){}", last(last_line)),
-            Self::Closed { last_line } => write!(f, "closed the connection{}", last(last_line)),
-            Self::Broken(error) => write!(f, "broke the protocol: {error}"),
-            Self::Said(text) => write!(f, "gave up: {text}"),
-            Self::NoHello { after, last_line } => {
-                write!(f, "has not answered `hello` within {} s{}", after.as_secs_f64(), last(last_line))
-            }
-            Self::Silent { after } => write!(f, "has not answered a `ping` for {} s", after.as_secs_f64()),
-            Self::NotReading => f.write_str("does not read what it is sent"),
-            Self::DoesNotStop => f.write_str("did not come to rest after `stop`; the connection was closed"),
-            Self::ClosedHere => f.write_str("was closed"),
-        }
-    }
+/// The last words of a driver, where it had any.
+fn last(line: Option<&String>) -> String {
+    line.map(|line| format!(": {line}")).unwrap_or_default()
 }

@@ -30,7 +30,7 @@ mod tests {
         let table = PAGE.split("## Limits").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("a section");
         let stated = [
             format!("{STATES_APART_S} s apart"),
-            format!("at the most {} s after it", STATE_AFTER_IMAGE.as_secs_f64()),
+            format!("at most {} s after it", STATE_AFTER_IMAGE.as_secs_f64()),
             format!("within {} s after `hello`", FIRST.as_secs()),
             format!("{IMAGE_AGE_S} s old"),
             format!("within {} s", IMAGE_WAIT.as_secs()),

@@ -52,7 +52,7 @@ pub struct RobotAt {
 }
 
 /// Why an image has no pose.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum NoPose {
     /// There is no robot.

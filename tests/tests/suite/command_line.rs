@@ -195,7 +195,7 @@ fn a_track_has_a_pose_for_every_image_and_needs_a_hand_eye_transform() {
         assert!(message.contains(words), "{arguments:?}: {message}");
     };
     unusable(&["--reach", "70"], "corners 0 to 69");
-    unusable(&["--reach", "0", "--stand-off=-1"], "-1 mm is no distance");
+    unusable(&["--reach", "0", "--stand-off=-1"], "-1 mm is not a distance");
     unusable(&["--target", "10x7"], "no chessboard");
     unusable(&["--connect", "not an address"], "not an address");
     unusable(&["--json", "/no/such/folder/track.json"], "cannot be written");

@@ -99,8 +99,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
         Detected::NoBoard => {
             let why = tr!(
                 language,
-                "The board was not found in this image, so it is not used. Look whether it is wholly in view, sharp and \
-                 lit, and whether its columns and rows are right; or delete this capture."
+                "The board was not found in this image, so it is not used. Check whether it is wholly in view, sharp and lit, and whether its columns and rows are right; or delete this capture."
             );
             flag(Some(Tone::Warning), tr!(language, "No board"), why.to_owned());
         }

@@ -179,7 +179,7 @@ pub fn hindrance(model: &Model) -> Option<&'static str> {
     if model.capture.is_some() {
         Some(tr!(language, "A capture is under way"))
     } else if model.sequence_runs {
-        Some(tr!(language, "The sequence takes the captures now"))
+        Some(tr!(language, "The sequence is taking the captures"))
     } else if !model.camera.is_connected() || model.frame.is_none() {
         Some(tr!(language, "There are no images: connect a cell first"))
     } else if !model.control.is_connected() {

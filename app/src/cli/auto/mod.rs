@@ -245,7 +245,8 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     });
     if captured.is_err() && !session.document().captures.is_empty() {
         let (count, folder) = (session.document().captures.len(), folder.display());
-        tracing::warn!("{count} captures are kept in {folder}; `handeye calibrate {folder}` solves them");
+        let captures = out::counted(count, "capture is", "captures are");
+        tracing::warn!("{captures} kept in {folder}; `handeye calibrate {folder}` solves it");
     }
     if let Some(guide) = &guide {
         guide.record().write(&folder.join(GUIDED_RECORD)).map_err(Failure::failed)?;
@@ -286,7 +287,7 @@ fn surroundings(
         (_, None) => return Ok(Surroundings::default()),
         (None, Some(_)) => {
             return Err(Failure::failed(anyhow::anyhow!(
-                "--keep-out needs an arm whose chain is known, or nobody can say what it would touch: leave the option out, or \
+                "--keep-out needs an arm whose chain is known, to know what it would touch: leave the option out, or \
                  give the scene an arm whose tip hangs on its base (docs/arms.md)"
             )));
         }

@@ -98,7 +98,7 @@ impl Plan {
             Some(published) => published,
             None => arm.base_from_board(&BOARD).map_err(Failure::failed)?.ok_or_else(|| {
                 Failure::failed(anyhow::anyhow!(
-                    "where the board is nobody says here, so that no views of it can be planned: name it by --object \
+                    "the position of the board is not known here, so that no views of it can be planned: name it by --object \
                      board=PATH, or bring it into the image and use --poses guided"
                 ))
             })?,

@@ -93,7 +93,7 @@ pub fn chessboard(text: &str) -> Result<TargetSpec, Failure> {
     };
     read().map(TargetSpec::Chessboard).ok_or_else(|| {
         Failure::unusable(anyhow::anyhow!(
-            "{text:?} is no chessboard: give inner corners along x and y, 3 or more, and the square in millimetres, as in \
+            "{text:?} is not a chessboard: give inner corners along x and y, 3 or more, and the square in millimetres, as in \
              10x7x15"
         ))
     })

@@ -290,7 +290,7 @@ impl Pause {
         }
         self.is_said = true;
         match sim.get_simulation_state()? {
-            SimulationState::Running => tracing::warn!("the time of the simulation stands still: waiting for it"),
+            SimulationState::Running => tracing::warn!("the simulated time does not advance: waiting for it"),
             SimulationState::Paused => tracing::warn!("the simulation is paused: waiting until it is continued"),
             SimulationState::Stopped => tracing::warn!("the simulation is stopped: waiting until it is started"),
         }
@@ -340,7 +340,7 @@ impl Follower {
         let place = self.kinematics.where_to_follow(&limits, &board, &joints, &standing.all(), Some(among));
         let Some(place) = place.map_err(Failure::failed)? else { return Ok(()) };
         tracing::info!(
-            "here the arm has no room to go along with the board: it moves to the nearest place where it has, and keeps the \
+            "here the arm has no room to follow the board: it moves to the nearest place where it has, and keeps the \
              view from there"
         );
         let limits = limits::of_joints(&limits::SEQUENCE, SHARE_OF_SPEED, self.arm.info().joint_kinds());
@@ -369,7 +369,9 @@ fn reach(
     let base_from_tip_orientation = arm.base_from_tip().map_err(Failure::failed)?.rotation();
     let keep = Keep::Corner { index, stand_off_m, base_from_tip_orientation };
     let goal = keep.tip_goal(&estimate, &job.setup.calibrated, &job.setup.target).ok_or_else(|| {
-        Failure::unusable(anyhow::anyhow!("only a camera on the tip can lead it to the board; this one stands beside"))
+        Failure::unusable(anyhow::anyhow!(
+            "only a camera on the tip can lead it to the board; this one stands beside the robot"
+        ))
     })?;
     let kinematics = arm.kinematics().map_err(Failure::failed)?;
     if let Ok(kinematics) = &kinematics {
@@ -384,8 +386,8 @@ fn progress(tracked: &Tracked) -> String {
     let state = match tracked.update.state {
         State::Searching => "searching for the board".to_owned(),
         State::Tracking { corners, of } => format!("{corners} of {of} corners"),
-        State::Coasting { since_s } => format!("not seen since {since_s:.2} s"),
-        State::Lost { since_s } => format!("lost since {since_s:.2} s"),
+        State::Coasting { since_s } => format!("not seen for {since_s:.2} s"),
+        State::Lost { since_s } => format!("lost for {since_s:.2} s"),
     };
     let place = tracked.update.estimate.as_ref().map_or_else(String::new, |estimate| {
         let at = estimate.base_from_target.translation() * 1e3;
@@ -462,9 +464,9 @@ impl Summary {
         if let (Some(m), Some(rad)) = (self.follow_distance.rms(), self.follow_angle.rms()) {
             let deg = rad.to_degrees();
             let mm = m * 1e3;
-            lines.push(format!("the tip from its goal: {mm:.2} mm and {deg:.3}° RMS, the way there included"));
+            lines.push(format!("the tip from its goal: {mm:.2} mm and {deg:.3}° RMS, including the approach"));
             if self.kept_off > 0 {
-                lines.push(format!("of it, in {} images the arm kept off what was too near", self.kept_off));
+                lines.push(format!("in {} of these images the arm kept clear of an obstacle", self.kept_off));
             }
         }
         lines.join("\n") + "\n"

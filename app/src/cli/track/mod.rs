@@ -124,7 +124,7 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     }
     let stand_off_m = args.stand_off * 1e-3;
     if !(stand_off_m.is_finite() && stand_off_m >= 0.0) {
-        return Err(Failure::unusable(anyhow::anyhow!("{} mm is no distance: give 0 or more", args.stand_off)));
+        return Err(Failure::unusable(anyhow::anyhow!("{} mm is not a distance: give 0 or more", args.stand_off)));
     }
     let task = match (args.follow, args.corner, args.reach) {
         (_, _, Some(index)) => Task::Reach { index, stand_off_m },

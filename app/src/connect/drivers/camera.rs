@@ -99,6 +99,6 @@ fn no_pose(why: &NoPose) -> Text {
             gap = seconds(gap_s),
             most = limits::STATES_APART_S
         ),
-        _ => Text::verbatim(why.to_string()),
+        _ => why.into(),
     }
 }

@@ -40,7 +40,7 @@ impl DriverConnector {
 
     /// The drivers that run. The other workers wait for the first.
     fn cell(&self, shutdown: &CancelToken) -> Result<DriverCell, PortError> {
-        let host = self.host.as_ref().map_err(|why| PortError::Hopeless(Text::verbatim(why.to_string())))?;
+        let host = self.host.as_ref().map_err(|why| PortError::Hopeless(why.into()))?;
         host.cell(shutdown).map_err(no_cell)
     }
 
@@ -126,9 +126,7 @@ fn spec(drivers: &Drivers) -> Result<DriverCellSpec, BadSpec> {
 /// Why there are no drivers, for a connection.
 fn no_cell(why: NoCell) -> PortError {
     match why {
-        NoCell::Later { error, tries, pause } => {
-            PortError::Later { why: Text::verbatim(error.to_string()), tries, pause }
-        }
+        NoCell::Later { error, tries, pause } => PortError::Later { why: error.into(), tries, pause },
         NoCell::Over { error, tries } if tries > 1 => PortError::Hopeless(text!(
             "{tries} starts in a row failed, so it is not started again by itself: {why}. Look at the command and at \
              what the driver says, then try again",
@@ -136,16 +134,16 @@ fn no_cell(why: NoCell) -> PortError {
             why = error
         )),
         NoCell::Over { error, .. } => port_error(error),
-        NoCell::Rests { error } => PortError::Rests(
-            error.map_or_else(|| text!("The driver was not started"), |error| Text::verbatim(error.to_string())),
-        ),
+        NoCell::Rests { error } => {
+            PortError::Rests(error.map_or_else(|| text!("The driver was not started"), Text::from))
+        }
     }
 }
 
 /// What an error of a driver means for a connection.
 #[expect(clippy::needless_pass_by_value, reason = "it is used up")]
 fn port_error(error: DriverError) -> PortError {
-    let text = Text::verbatim(error.to_string());
+    let text = Text::from(&error);
     match error {
         DriverError::Gone { .. } | DriverError::Connect { .. } | DriverError::NoAnswer { .. } => PortError::Lost(text),
         DriverError::Start { .. } | DriverError::Cannot { .. } => PortError::Hopeless(text),

@@ -57,8 +57,7 @@ impl DriverMotion {
                  turned by 15° or more, about two axes"
             )),
             ChainPlacement::Foreign { distance_m, angle_rad } => Err(text!(
-                "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it: its chain of joints \
-                 is not driven by",
+                "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it: its chain of joints is not used",
                 distance = format!("{:.1}", distance_m * 1e3),
                 angle = format!("{:.2}", angle_rad.to_degrees())
             )),
@@ -118,7 +117,7 @@ impl DriverMotion {
         }
         Ok(self.placed()?.and_then(|Placed { kinematics, joints, .. }| {
             let found = kinematics.reach(&pose, &joints);
-            found.map(Goal::Joints).map_err(|why| Text::verbatim(why.to_string()))
+            found.map(Goal::Joints).map_err(Text::from)
         }))
     }
 
@@ -172,7 +171,7 @@ impl DriverMotion {
             Ok(MoveEnd::Refused(why)) => Ok(MotionOutcome::Refused(text!("The robot refuses: {why}", why = why))),
             Err(DriverError::NotArmed { why, .. }) => Ok(MotionOutcome::Refused(read_only(why))),
             Err(error @ (DriverError::Cannot { .. } | DriverError::Busy { .. } | DriverError::Refused { .. })) => {
-                Ok(MotionOutcome::Refused(Text::verbatim(error.to_string())))
+                Ok(MotionOutcome::Refused(error.into()))
             }
             Err(error) => Err(port_error(error)),
         }
@@ -252,8 +251,7 @@ impl MotionPort for DriverMotion {
         let known = self.kinematics().map(|_known| Surroundings::default());
         known.map_err(|_unknown| {
             text!(
-                "A robot behind a driver goes the ways of its own controller, and as long as its chain of joints is not known they \
-                 cannot be checked: set its safety planes there"
+                "The controller of a robot behind a driver plans its own paths, and as long as its chain of joints is not known they cannot be checked: set safety planes on the controller"
             )
         })
     }

@@ -249,7 +249,7 @@ fn a_driver_without_images_says_what_is_missing_and_one_that_is_not_there_is_tri
     assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Later { .. })));
     nobody.rest();
     let Err(PortError::Rests(why)) = nobody.connect_control(&shutdown) else { panic!("it is tried on") };
-    assert!(why.foreign_words().is_some_and(|why| why.contains("no driver listens")), "{why:?}");
+    assert!(why.say(Language::English).contains("no driver listens"), "{why:?}");
     nobody.again();
     assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Later { .. })));
     let no_program = connector(Some("no-such-program-anywhere --x".to_owned()), None);

@@ -93,7 +93,7 @@ fn columns(rotation: TypedRotation) -> &'static str {
 
 fn fault(error: &TypedPoseError) -> Text {
     match error {
-        TypedPoseError::NoNumber { word } => text!("“{word}” is no number", word = word),
+        TypedPoseError::NoNumber { word } => text!("“{word}” is not a number", word = word),
         TypedPoseError::Count { got, need } => {
             text!("There are {got} numbers, and this convention has {need}", got = got, need = need)
         }
@@ -110,9 +110,9 @@ fn fault(error: &TypedPoseError) -> Text {
             length = format!("{length:.4}")
         ),
         TypedPoseError::NoRotation => {
-            text!("The first three columns are no rotation: check that the numbers are given row by row")
+            text!("The first three columns are not a rotation: check that the numbers are given row by row")
         }
-        other => Text::verbatim(other.to_string()),
+        other => other.into(),
     }
 }
 

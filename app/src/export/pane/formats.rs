@@ -9,7 +9,6 @@ use super::preview;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::model::Model;
-use crate::text::Text;
 use crate::{text, tr};
 
 /// The list.
@@ -47,13 +46,13 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
     let language = model.view.language;
     let name = format.name();
     let refusal = match model.export.previews.get(name) {
-        Some(Err(why)) => Some(why.as_str()),
+        Some(Err(why)) => Some(why.say(language)),
         _ => None,
     };
     ui.horizontal(|ui| {
         let mut is_chosen = model.export.chosen.contains(name) && refusal.is_none();
         let box_ = ui.add_enabled(refusal.is_none(), egui::Checkbox::new(&mut is_chosen, name));
-        if box_.on_disabled_hover_text(refusal.unwrap_or_default()).changed() {
+        if box_.on_disabled_hover_text(refusal.clone().unwrap_or_default()).changed() {
             let mut chosen = model.export.chosen.clone();
             if is_chosen {
                 chosen.insert(name.to_owned());
@@ -77,7 +76,7 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
     });
     ui.indent(name, |ui| match refusal {
         Some(why) => {
-            let said = text!("Not possible: {why}", why = Text::verbatim(why)).say(language);
+            let said = text!("Not possible: {why}", why = why).say(language);
             let warning = crate::gui::style::theme::Palette::of(ui).warning;
             ui.add(egui::Label::new(egui::RichText::new(said).small().color(warning)).wrap());
         }

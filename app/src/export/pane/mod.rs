@@ -41,7 +41,7 @@ fn blocked(model: &Model) -> Option<&'static str> {
     if model.solve.solved.is_none() {
         Some(tr!(language, "Solve first"))
     } else if model.solve.current().is_none() {
-        Some(tr!(language, "The answer is of earlier captures: wait for the solve, or solve again"))
+        Some(tr!(language, "The result is from earlier captures: wait for the solve, or solve again"))
     } else {
         None
     }

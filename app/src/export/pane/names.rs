@@ -8,6 +8,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::{Palette, Tone};
 use crate::model::Model;
+use crate::text::Text;
 use crate::{text, tr};
 
 /// Names that are being edited.
@@ -59,7 +60,7 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
     });
     match draft.names.check() {
-        Err(error) => parts::notice_ui(ui, Tone::Bad, &error.to_string(), |_| ()),
+        Err(error) => parts::notice_ui(ui, Tone::Bad, &Text::from(error).say(language), |_| ()),
         Ok(()) if is_left && draft.names != model.export.names => {
             outbox.send(Command::SetExportNames(draft.names.clone()));
             // It is shown as it was until the names are taken.

@@ -24,7 +24,7 @@ fn without_an_answer_it_says_solve_first() {
     let mut model = model();
     model.solve.fresh = false;
     let pane = driven(model);
-    assert!(pane.sees("The answer is of earlier captures"));
+    assert!(pane.sees("The result is from earlier captures"));
     assert!(!pane.is_enabled("Export 4 formats"));
 }
 
@@ -42,7 +42,7 @@ fn formats_are_chosen_and_left_out() {
 #[test]
 fn a_format_that_cannot_hold_the_result_says_why_and_is_not_written() {
     let mut model = model();
-    model.export.previews.insert("easy_handeye2".to_owned(), Err("it has no hand-eye".to_owned()));
+    model.export.previews.insert("easy_handeye2".to_owned(), Err(crate::text::Text::verbatim("it has no hand-eye")));
     let pane = driven(model);
     assert!(pane.sees("Not possible: it has no hand-eye"));
     assert!(!pane.is_enabled("easy_handeye2"));
@@ -111,7 +111,7 @@ fn every_file_is_named_as_read_back_or_the_reason_is_given() {
     let mut pane = driven(model);
     assert!(pane.sees("a.yaml") && pane.sees("read back and compared"));
     assert!(pane.is_enabled("Copy path of a.yaml"));
-    pane.model().export.written = Some(Written { folder, files: Err("the disk is full".to_owned()) });
+    pane.model().export.written = Some(Written { folder, files: Err(crate::text::Text::verbatim("the disk is full")) });
     pane.steps();
     assert!(pane.sees("Nothing was exported: the disk is full"));
 }

@@ -175,7 +175,7 @@ fn under_way(model: &Model) -> Option<Text> {
     }
     match (&model.motion, &model.track.follow) {
         (_, FollowStatus::MakingRoom) => Some(text!("Moving to where the arm has room to follow…")),
-        (_, FollowStatus::Waiting) => Some(text!("The arm stands until the board is seen again")),
+        (_, FollowStatus::Waiting) => Some(text!("The arm waits until the board is seen again")),
         (_, FollowStatus::Following { .. }) => Some(text!("The arm follows the board")),
         (Motion::Moving { what, since_s, .. }, _) => {
             let seconds = format!("{:.0}", (model.now_s - since_s).max(0.0));

@@ -82,7 +82,7 @@ fn frame_rate_ui(ui: &mut Ui, model: &Model) {
     };
     ui.label(RichText::new("·").color(palette.weak));
     let what = text!(
-        "Images that arrive per second. The window draws the newest; {count} had a newer one behind them before their turn",
+        "Images that arrive per second. The window draws the newest; {count} were replaced by a newer one before they were drawn",
         count = model.dropped_frames
     );
     ui.label(RichText::new(text).color(palette.weak)).on_hover_text(what.say(language));

@@ -275,7 +275,7 @@ pub fn previewed() -> Model {
     for format in export::formats() {
         let files = export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
         let files = files
-            .map_err(|error| error.to_string())
+            .map_err(crate::text::Text::from)
             .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());
         model.export.previews.insert(format.name().to_owned(), files);
     }

@@ -31,7 +31,7 @@ pub fn fixed_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Lang
                 values.push(&convention.value);
             }
         }
-        let by_data = tr!(language, "as the data tell");
+        let by_data = tr!(language, "from the data");
         let now = import.fixed.get(key).map(String::as_str);
         parts::row_ui(ui, name(key, language), |ui| {
             let combo = ComboBox::from_id_salt(("convention", key)).width(260.0).selected_text(now.unwrap_or(by_data));

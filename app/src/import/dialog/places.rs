@@ -21,7 +21,7 @@ pub fn places_ui(ui: &mut Ui, found: &Found, h: &Hypothesis, language: Language)
     let samples = &found.recording.tracks[h.robot].samples;
     let paired = samples.iter().zip(&h.pairing.image_of).filter(|(_, image)| image.is_some());
     let poses: Vec<_> = paired.filter_map(|(sample, _)| h.base_from_tip(sample)).collect();
-    let said = text!("Tip of the robot in {count} views, in its base", count = poses.len());
+    let said = text!("Tip of the robot in {count} {count|view|views}, in its base", count = poses.len());
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, said.say(language)));
     let edge = Stroke::new(1.0, palette.edge);
     ui.painter().rect(area, CornerRadius::same(6), palette.paper.gamma_multiply(0.06), edge, egui::StrokeKind::Inside);

@@ -27,7 +27,7 @@ pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         });
         let words = RichText::new(tr!(language, "Move there")).strong().color(Marks::of(ui).on_accent);
         let button = Button::new(words).fill(Palette::of(ui).accent);
-        let what = tr!(language, "Nothing that is known is touched on the way. STOP ends the move");
+        let what = tr!(language, "The path is clear of all known obstacles. STOP ends the move");
         if parts::gated_ui(ui, hindrance, button).on_hover_text(what).clicked() {
             outbox.send(Command::ConfirmMove);
         }

@@ -86,7 +86,7 @@ pub fn unknown_arm(model: &Model) -> Option<&'static str> {
         ),
         Some(ArmDoubt::Foreign { .. }) => tr!(
             language,
-            "The robot's joints and poses do not belong together: the log says how far they are apart, and what to do"
+            "The robot's joints and poses do not agree: the log says how far they are apart, and what to do"
         ),
         None => tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"),
     })

@@ -103,7 +103,7 @@ fn speed_said(moves: Moves, share: f64) -> (Text, Text) {
     }
     let line = format!("{:.0}", JOG_LINE_SPEED_M_S * 1e3 * share);
     let more = text!(
-        "Jogging: at the most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint. Moves to a pose or to joint \
+        "Jogging: at most {line} mm/s along a line, {turn}°/s about an axis, {joint}°/s for a joint. Moves to a pose or to joint \
          values: up to {pose}°/s for a joint, which takes the tip along faster",
         line = &line,
         turn = format!("{:.1}", JOG_TURN_SPEED_RAD_S.to_degrees() * share),

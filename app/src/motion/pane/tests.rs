@@ -183,9 +183,12 @@ fn numbers_follow_the_arm_until_a_person_edits_them_and_say_how_far_the_move_is(
 
     pane.type_into("J1 of the goal", "-93");
     pane.press(Key::Enter);
-    assert!(pane.sees("J1 goes farthest, by 194.0°"));
+    assert!(pane.sees("the joint that moves most is J1, by 194.0°"));
     turn(&mut pane, 11.0);
-    assert!(pane.sees("J1 goes farthest, by 104.0°"), "what was typed stays, and the way is that from here");
+    assert!(
+        pane.sees("the joint that moves most is J1, by 104.0°"),
+        "what was typed stays, and the way is that from here"
+    );
     assert!((goal(&mut pane) + 93.0).abs() < 1e-9);
 
     pane.model().cells += 1;

@@ -21,6 +21,7 @@ use super::paths::{self, below};
 use super::pen::{Clock, Instant, Pen};
 use super::style;
 use crate::scene::{self, BAD_AT_MEDIANS, CaptureItem, Known, Standing, outcome};
+use crate::text;
 
 /// A capture that is in the recording.
 #[derive(Debug)]
@@ -132,7 +133,7 @@ impl Captures {
         let file = folder.join(&record.image);
         match std::fs::read(&file) {
             Ok(bytes) => Ok(Some(EncodedImage::from_file_contents(bytes))),
-            Err(error) => Err(RecordError::File { capture: record.id.0, file, reason: error.to_string() }),
+            Err(error) => Err(RecordError::File { capture: record.id.0, file, reason: text!("{why}", why = error) }),
         }
     }
 
@@ -145,7 +146,7 @@ impl Captures {
         let failed = |file: &str, error: SessionError| RecordError::File {
             capture: record.id.0,
             file: folder.join(file),
-            reason: error.to_string(),
+            reason: error.into(),
         };
         let Some(depth) = session.load_depth_m(record).map_err(|error| failed(name, error))? else { return Ok(None) };
         let rgb = session.load_rgb(record).map_err(|error| failed(&record.image, error))?;

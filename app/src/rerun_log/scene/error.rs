@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use crate::text::Text;
+
 /// Why something is not in the recording.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum RecordError {
     /// The stream did not take it.
-    #[error("{path} could not be recorded: {source}")]
+    #[error("{path} could not be recorded: {why}", why = source.to_string())]
     Stream {
         /// Which entity.
         path: String,
@@ -15,14 +17,14 @@ pub enum RecordError {
         source: Box<rerun::RecordingStreamError>,
     },
     /// A file of a capture cannot be read; everything else of the entry is recorded.
-    #[error("{} of capture {capture} is not in the recording: {reason}", file.display())]
+    #[error("{file} of capture {capture} is not in the recording: {reason}", file = file.display())]
     File {
         /// Which capture.
         capture: u32,
         /// Which file.
         file: PathBuf,
         /// What is wrong with it.
-        reason: String,
+        reason: Text,
     },
     /// The result has numbers that its file format does not allow; everything else of the entry is recorded.
     #[error("the result is not in the recording as JSON: {reason}")]

@@ -93,7 +93,7 @@ fn capture_entries(
             Standing::Verification,
             marks.verify,
             tr!(language, "Captures for verification"),
-            tr!(language, "Captures that never enter the fit and test it"),
+            tr!(language, "Captures that are not in the fit and verify it"),
         ),
         (
             Standing::Excluded,

@@ -20,11 +20,6 @@ use crate::text::Text;
 /// How a recording was understood, in the session that it became.
 const IMPORTED: &str = "imported.toml";
 
-/// What a library says of a file, in its own words.
-fn said_by(error: impl std::error::Error) -> Text {
-    Text::verbatim(error.to_string())
-}
-
 impl Archive {
     pub(super) fn import(&mut self, dataset: &Path, bounds: &Bounds) {
         let name = dataset.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -93,7 +88,7 @@ impl Archive {
 
     /// The session, and how many files of the data set lie outside of its folder.
     fn copy(&self, folder: &Path, name: &str, bounds: &Bounds) -> Result<(Store, usize), Text> {
-        let dataset = Dataset::read_within(folder, bounds).map_err(said_by)?;
+        let dataset = Dataset::read_within(folder, bounds)?;
         let target_folder = free_folder(&self.sessions, name);
         let mut meta = start::meta(None, timestamp_rfc3339());
         meta.target = dataset.target;
@@ -122,9 +117,9 @@ impl Archive {
             }
             captures.push((entry, base_from_tip));
         }
-        let mut store = Store::create_with(&target_folder, Document::new(meta)).map_err(said_by)?;
+        let mut store = Store::create_with(&target_folder, Document::new(meta))?;
         for (entry, base_from_tip) in captures {
-            let image = dataset.load_rgb(entry).map_err(said_by)?;
+            let image = dataset.load_rgb(entry)?;
             let added = store.add_capture(&Capture {
                 image: &image,
                 depth_m: None,
@@ -137,7 +132,7 @@ impl Archive {
                 settled_s: None,
                 pose_name: Some(&entry.name),
             });
-            added.map_err(said_by)?;
+            added?;
         }
         Ok((store, dataset.outside.len()))
     }

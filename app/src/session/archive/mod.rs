@@ -205,7 +205,7 @@ impl Archive {
     }
 
     /// Goes on with another session, or tells why not and stays with the present one.
-    fn take(&mut self, store: Result<Store, SessionError>, words: impl FnOnce(String) -> Text) {
+    fn take(&mut self, store: Result<Store, SessionError>, words: impl FnOnce(SessionError) -> Text) {
         match store {
             Ok(store) => {
                 let exported = exported::is_exported(store.folder());
@@ -213,7 +213,7 @@ impl Archive {
                 self.report_document();
                 self.outlet.report(Event::SessionOpened { exported });
             }
-            Err(error) => self.outlet.report(Event::SessionFailed { why: words(error.to_string()) }),
+            Err(error) => self.outlet.report(Event::SessionFailed { why: words(error) }),
         }
     }
 

@@ -19,7 +19,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     let calibration = model.solve.solved.as_ref().map(|solved| &solved.calibration);
     if calibration.is_some_and(|calibration| calibration.claim != Claim::AsModelled) {
         // The curve is that of the noise alone.
-        instead_ui(ui, tr!(language, "More poses do not help before what was found is mended"));
+        instead_ui(ui, tr!(language, "More poses do not help until what was found is corrected"));
         return;
     }
     let joint = calibration.and_then(|calibration| calibration.joint.as_ref());

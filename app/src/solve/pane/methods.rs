@@ -8,7 +8,7 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
 use crate::model::{Model, Solved};
-use crate::text::Language;
+use crate::text::{Language, Text};
 use crate::tr;
 
 /// The table; the first column chooses.
@@ -59,7 +59,7 @@ fn row_ui(ui: &mut Ui, name: &str, answer: Option<&Pose<Mount, Camera>>, solved:
     let Some(method) = solved.calibration.methods.iter().find(|method| method.name == name) else {
         ui.label("");
         ui.label("");
-        ui.label(RichText::new(tr!(language, "weighs all noise")).small().color(palette.weak));
+        ui.label(RichText::new(tr!(language, "weights all noise")).small().color(palette.weak));
         return;
     };
     match &method.outcome {
@@ -76,7 +76,7 @@ fn row_ui(ui: &mut Ui, name: &str, answer: Option<&Pose<Mount, Camera>>, solved:
             ui.label("–");
             ui.label("–");
             ui.label(RichText::new(tr!(language, "no answer")).small().color(palette.warning))
-                .on_hover_text(error.to_string());
+                .on_hover_text(Text::from(error).say(language));
         }
     }
 }

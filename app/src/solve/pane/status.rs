@@ -46,8 +46,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let Some(solved) = &model.solve.solved else {
         let count = model.document().in_use().count();
         let detail = text!(
-            "A calibration takes three captures of the board at the least, ten are good. There are {count}. It is solved \
-             by itself as soon as there are enough.",
+            "A calibration takes at least three captures of the board, ten are good. Captures so far: {count}. It is solved automatically as soon as there are enough.",
             count = count
         );
         parts::empty_ui(ui, tr!(language, "No calibration yet"), &detail.say(language));
@@ -73,7 +72,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             }
         });
     } else {
-        let text = tr!(language, "Out of date: this answer is of earlier captures or settings");
+        let text = tr!(language, "Out of date: this result is from earlier captures or settings");
         parts::notice_ui(ui, Tone::Warning, text, |ui| again_ui(ui, language, outbox));
     }
 }

@@ -27,11 +27,11 @@ fn driven(model: Model) -> Driven {
 fn without_an_answer_it_says_what_is_missing() {
     let mut pane = driven(sample::connected());
     assert!(pane.sees("No calibration yet"));
-    assert!(pane.sees("There are 0."));
+    assert!(pane.sees("Captures so far: 0."));
     assert!(!pane.is_enabled("Solve"));
     *pane.model() = sample::captured();
     pane.steps();
-    assert!(pane.sees("There are 10."));
+    assert!(pane.sees("Captures so far: 10."));
     assert_eq!(pane.click("Solve"), [Command::Solve]);
 }
 

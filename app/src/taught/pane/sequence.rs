@@ -65,8 +65,10 @@ pub fn home_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     if model.source.is_built_in() {
         let button = Button::new(tr!(language, "Reset the cell"));
-        let what =
-            tr!(language, "Starts the built-in cell again: arm and board stand as at first; the session stays open");
+        let what = tr!(
+            language,
+            "Restarts the built-in cell: arm and board return to where they started; the session stays open"
+        );
         let reason = model.sequence_runs.then(|| tr!(language, "A sequence is under way"));
         if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
             outbox.send(Command::ResetCell);

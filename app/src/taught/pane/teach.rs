@@ -14,7 +14,7 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let mut name: String = parts::remembered(ui, id);
     let taken = model.taught().iter().any(|pose| pose.name == name.trim());
     let reason = if model.robot.is_none() || !model.control.is_connected() {
-        Some(tr!(language, "Not connected: the place of the arm is not known"))
+        Some(tr!(language, "Not connected: the position of the arm is not known"))
     } else if taken {
         Some(tr!(language, "There is a pose of that name already"))
     } else {

@@ -48,7 +48,7 @@ pub fn board_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
                 outbox.send(Command::MoveBoard(BoardMotion { path: motion.path, speed_m_s: next_m_s }));
             }
             let mut hidden = model.track.board_hidden;
-            let what = tr!(language, "Take the board away for a while, to see tracking coast, lose and find it");
+            let what = tr!(language, "Hide the board for a while, to see tracking coast, lose it and find it again");
             if ui.checkbox(&mut hidden, tr!(language, "Hide the board")).on_hover_text(what).changed() {
                 outbox.send(Command::HideBoard(hidden));
             }

@@ -102,8 +102,7 @@ fn choice_ui(ui: &mut Ui, model: &Model, choice: &mut Choice) {
     if !choice.to_corner {
         let what = tr!(
             language,
-            "Where the arm would soon be stretched, too close to its column or have two axes in line, it first moves to the \
-             nearest place from which it can go along with the board, and keeps the view from there"
+            "Where the arm would soon be stretched, too close to its column or have two axes in line, it first moves to the nearest place from which it can follow the board, and keeps the view from there"
         );
         ui.checkbox(&mut choice.with_room, tr!(language, "Make room first where it is needed")).on_hover_text(what);
         return;
@@ -154,7 +153,7 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
             (palette.busy, tr!(language, "Moving to where the arm has room to follow…").to_owned())
         }
         (FollowStatus::Waiting, _) => {
-            (palette.busy, tr!(language, "The arm stands until the board is seen again").to_owned())
+            (palette.busy, tr!(language, "The arm waits until the board is seen again").to_owned())
         }
         (FollowStatus::Off, true) => (palette.busy, tr!(language, "Starting to follow…").to_owned()),
         (FollowStatus::Off | FollowStatus::Ended(_), _) => return,
@@ -170,7 +169,11 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
 fn following(distance_m: f64, angle_rad: f64, is_kept_off: bool, language: Language) -> String {
     let (distance, angle) = (format!("{:.1}", distance_m * 1e3), format!("{:.2}", angle_rad.to_degrees()));
     let said = if is_kept_off {
-        text!("Keeping off what is near: {distance} mm and {angle}° from the goal", distance = distance, angle = angle)
+        text!(
+            "Keeping clear of an obstacle: {distance} mm and {angle}° from the goal",
+            distance = distance,
+            angle = angle
+        )
     } else {
         text!("Following: {distance} mm and {angle}° from the goal", distance = distance, angle = angle)
     };

@@ -35,7 +35,7 @@ pub fn plots_ui(ui: &mut Ui, model: &Model) {
     let Some(newest) = history.back() else { return };
     let language = model.view.language;
     let (palette, marks) = (Palette::of(ui), Marks::of(ui));
-    parts::section_ui(ui, tr!(language, "Last half minute"));
+    parts::section_ui(ui, tr!(language, "Last 30 s"));
     let curve = |name, colour, value: &dyn Fn(&TrackPoint) -> Option<f64>| Curve {
         name,
         colour,

@@ -97,7 +97,7 @@ fn newest_image_ui(ui: &mut Ui, update: &Update, language: Language) {
     if update.seen.is_none() && update.by_depth.is_none() {
         return;
     }
-    parts::section_ui(ui, tr!(language, "Newest image alone"));
+    parts::section_ui(ui, tr!(language, "Newest image only"));
     let position = |pose: &Pose<Base, Target>| numbers::row((pose.translation() * 1e3).as_slice(), 2, FIGURES);
     if let Some(seen) = &update.seen {
         let what = text!(

@@ -57,7 +57,7 @@ pub fn state_ui(ui: &mut Ui, model: &Model) {
     let words = text!("{rate} Hz · {latency} ms", rate = rate, latency = latency).say(language);
     let what = crate::tr!(
         language,
-        "Poses per second, and the time from the arrival of an image to the pose that comes of it"
+        "Poses per second, and the time from the arrival of an image to the pose computed from it"
     );
     ui.label(RichText::new(words).color(palette.weak)).on_hover_text(what);
 }

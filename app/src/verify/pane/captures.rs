@@ -26,9 +26,9 @@ pub fn captures_ui(
         let weak = Palette::of(ui).weak;
         for (heading, what) in [
             (tr!(language, "Capture"), tr!(language, "Click to see its image")),
-            ("mm", tr!(language, "Middle of the board: as seen from as predicted")),
-            ("°", tr!(language, "Orientation of the board: as seen from as predicted")),
-            ("px", tr!(language, "Corners: as seen from as predicted, RMS")),
+            ("mm", tr!(language, "Middle of the board: measured minus predicted")),
+            ("°", tr!(language, "Orientation of the board: measured minus predicted")),
+            ("px", tr!(language, "Corners: measured minus predicted, RMS")),
             (tr!(language, "depth mm"), tr!(language, "Measured depth minus that of the predicted board, median")),
             (
                 tr!(language, "ratio"),

@@ -12,7 +12,6 @@ use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::gui::style::theme::Tone;
 use crate::model::{CapturePurpose, Model};
-use crate::text::Text;
 use crate::{text, tr};
 
 /// The pane.
@@ -34,13 +33,12 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             None => parts::hint_ui(ui, tr!(language, "There is no calibration to verify yet.")),
             Some((_, None)) => parts::hint_ui(ui, without_verification(model)),
             Some((_, Some(Err(error)))) => {
-                let why = Text::verbatim(error.to_string());
-                let said = text!("Verification has no answer: {why}", why = why).say(language);
+                let said = text!("Verification has no answer: {why}", why = error).say(language);
                 parts::notice_ui(ui, Tone::Bad, &said, |_| ());
             }
             Some((solved, Some(Ok(verification)))) => {
                 if !model.solve.fresh {
-                    let said = tr!(language, "Out of date: this is of earlier captures or settings");
+                    let said = tr!(language, "Out of date: this is from earlier captures or settings");
                     parts::notice_ui(ui, Tone::Warning, said, |_| ());
                 }
                 summary::summary_ui(ui, model, verification);
@@ -70,7 +68,7 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let reason = if !model.camera.is_connected() || !model.control.is_connected() {
             Some(tr!(language, "Not connected: there is nothing to capture"))
         } else if model.resting_simulation().is_some() {
-            Some(tr!(language, "Images are renewed only while the simulation runs"))
+            Some(tr!(language, "Images are updated only while the simulation runs"))
         } else if model.capture.is_some() {
             Some(tr!(language, "A capture is under way"))
         } else if model.sequence_runs || model.planning {

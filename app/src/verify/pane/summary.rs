@@ -16,15 +16,14 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
     parts::section_ui(ui, &title.say(language));
     let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
     parts::stated_ui(ui, tr!(language, "Middle of the board"), &mm(verification.centre_rms_m))
-        .on_hover_text(tr!(language, "Distance between the middle of the board as seen and as predicted"));
+        .on_hover_text(tr!(language, "Distance between the measured and the predicted middle of the board"));
     let deg = verification.orientation_rms_rad.to_degrees();
     parts::stated_ui(ui, tr!(language, "Its orientation"), &format!("{deg:.3}°"));
     parts::stated_ui(ui, tr!(language, "Its corners"), &format!("{:.3} px", verification.rms_px));
     let scatter = verification.origin_scatter_m.map_or_else(|| "–".to_owned(), mm);
-    parts::stated_ui(ui, tr!(language, "Scatter of its place"), &scatter).on_hover_text(tr!(
+    parts::stated_ui(ui, tr!(language, "Scatter of its position"), &scatter).on_hover_text(tr!(
         language,
-        "How much the place of the board differs from capture to capture. A board that was moved leaves it small while \
-         every prediction is wrong"
+        "How much the position of the board differs from capture to capture. A board that was moved leaves it small while every prediction is wrong"
     ));
     let palette = Palette::of(ui);
     let (colour, verdict) = match &verification.consistency {

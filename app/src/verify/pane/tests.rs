@@ -50,7 +50,7 @@ fn errors_are_stated_in_millimetres_degrees_and_pixels_and_judged() {
     assert!(pane.sees("Middle of the board: 0.123 mm"));
     assert!(pane.sees("Its orientation: 0.100°"));
     assert!(pane.sees("Its corners: 0.456 px"));
-    assert!(pane.sees("Scatter of its place: –"));
+    assert!(pane.sees("Scatter of its position: –"));
     assert!(pane.sees("The errors are of the size that the calibration states"));
     assert_eq!(pane.click("Capture 12"), [Command::Select(vec![CaptureId(12)])]);
 }

@@ -25,7 +25,6 @@ use super::slot::{LatestSlot, Tap};
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
 use crate::command::Event;
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
-use crate::text::Text;
 use crate::track::follow_line::FollowLine;
 use crate::track::worker::{TrackedImage, Tracking};
 
@@ -192,7 +191,7 @@ impl Vision {
         let Some(setup) = setup else { return };
         match Tracking::new(*setup, Arc::clone(&self.sights.follow)) {
             Ok(tracking) => self.tracking = Some(tracking),
-            Err(error) => self.outlet.report(Event::TrackFailed { why: Text::verbatim(error.to_string()) }),
+            Err(error) => self.outlet.report(Event::TrackFailed { why: error.into() }),
         }
     }
 
@@ -231,7 +230,7 @@ impl Vision {
             }
             Err(error) => {
                 self.tracking = None;
-                self.outlet.report(Event::TrackFailed { why: Text::verbatim(error.to_string()) });
+                self.outlet.report(Event::TrackFailed { why: error.into() });
             }
         }
     }

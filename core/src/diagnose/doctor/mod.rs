@@ -197,7 +197,7 @@ fn examine(
     diagnosis.findings.extend(words::wrong_corners(&sight));
     let views = sight.views.len();
     if views < gross::NEED {
-        return Err(format!("{views} views with the target and a robot pose, {} are needed", gross::NEED));
+        return Err(format!("views with the target and a robot pose: {views}, {} are needed", gross::NEED));
     }
     if let Some(behind) = words::behind_the_camera(&sight) {
         diagnosis.findings.push(behind);
@@ -215,7 +215,7 @@ fn examine(
         return Ok(());
     }
     if views < select::NEED {
-        return Err(format!("{views} views with the target and a robot pose, {} are needed", select::NEED));
+        return Err(format!("views with the target and a robot pose: {views}, {} are needed", select::NEED));
     }
     let selection = select::select(&sight, &start, work).ok_or_else(|| {
         if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }

@@ -284,10 +284,10 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
             text!("Most of them do, so the views determine the answer weakly: add views with more tilt and turn."),
         )
     } else {
-        (Severity::Info, text!("The others agree; these weigh noise badly and are for comparison only."))
+        (Severity::Info, text!("The others agree; these are sensitive to noise and are for comparison only."))
     };
     let list = Text::list(each);
-    let text = text!("Closed forms differ from the middle of all: {list}. {advice}", list = list, advice = advice);
+    let text = text!("Closed forms differ from the median of all: {list}. {advice}", list = list, advice = advice);
     let finding = Finding::new(FindingCode::ClosedFormsDisagree, severity, text);
     let finding = finding.with("median_distance", typical_m * 1e3, "mm");
     Some(off.iter().fold(finding, |f, (name, d)| f.with(name, d * 1e3, "mm")))
@@ -320,7 +320,7 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
         finding(FindingCode::GoalNotReached, Severity::Advice, text)
     };
     if calibration.claim != Claim::AsModelled {
-        return Some(not_reached(text!("More views do not help before what was found is mended.")));
+        return Some(not_reached(text!("More views do not help until what was found is corrected.")));
     }
     let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
         return Some(not_reached(text!(

@@ -52,7 +52,7 @@ pub fn finding(calibration: &Calibration) -> Option<Finding> {
         )
     } else {
         (
-            text!("the place of what it sees along {axis}", axis = named(&axis)),
+            text!("the position of what it sees along {axis}", axis = named(&axis)),
             Text::verbatim(format!("±{sigma_mm:.3} mm")),
         )
     };

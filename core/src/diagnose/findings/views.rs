@@ -52,9 +52,8 @@ pub fn findings(observations: &Observations, calibration: Option<&Calibration>) 
 
 fn number(views: usize) -> Option<Finding> {
     let (severity, need, text) = if views < MIN_VIEWS {
-        let text = text!(
-            "{views} {views|view|views} of the target: a calibration takes {need} at the least. Capture more poses."
-        );
+        let text =
+            text!("{views} {views|view|views} of the target: a calibration takes at least {need}. Capture more poses.");
         (Severity::Problem, MIN_VIEWS, text)
     } else if views < GOOD_VIEWS {
         let text = text!(

@@ -26,6 +26,8 @@ pub mod subset;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use crate::text;
+use crate::wording::Text;
 
 /// Where the camera sits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -142,11 +144,11 @@ pub struct PosePair {
 }
 
 /// Why a hand-eye calibration has no answer.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum HandEyeError {
     /// Fewer views than the method needs.
-    #[error("{got} views with a robot pose and the target in sight, at least {need} are needed: capture more poses")]
+    #[error("views with a robot pose and the target in sight: {got}, at least {need} are needed; capture more poses")]
     TooFewViews {
         /// Usable views.
         got: usize,
@@ -164,9 +166,12 @@ pub enum HandEyeError {
     },
     /// The robot turned about one direction only, so the translation along it cannot be seen.
     #[error(
-        "all rotations are about the same axis [{:.3} {:.3} {:.3}] of the {frame} (spread {spread_deg:.3}°): add views \
+        "all rotations are about the same axis [{x:.3} {y:.3} {z:.3}] of the {frame} (spread {spread_deg:.3}°): add views \
          turned about another axis",
-        axis[0], axis[1], axis[2]
+        x = axis[0],
+        y = axis[1],
+        z = axis[2],
+        frame = named(frame)
     )]
     ParallelAxes {
         /// The common axis.
@@ -195,6 +200,14 @@ pub enum HandEyeError {
         /// What failed.
         reason: &'static str,
     },
+}
+
+fn named(frame: &str) -> Text {
+    match frame {
+        "tip" => text!("tip"),
+        "base" => text!("base"),
+        other => Text::verbatim(other),
+    }
 }
 
 /// What was found; `None` where the data determine nothing.

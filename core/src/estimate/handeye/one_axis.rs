@@ -19,14 +19,14 @@
 //! Tsai & Lenz 1989, section II; Andreff et al. 2001, "Robot hand-eye calibration using structure from motion", section 3.4
 //! (planar motions).
 
-use std::fmt;
-
 use nalgebra::{Matrix2, Matrix3, Matrix4, Unit, UnitQuaternion, Vector2, Vector3, Vector4};
 
 use super::closed_form::ClosedFormSolution;
 use super::motion::{NO_ROTATION_RAD, pairs_of, relative, rotation_angle};
 use super::{Mode, PosePair, pose_graph, subset};
 use crate::geometry::frames::{Camera, Mount, Pose};
+use crate::text;
+use crate::wording::Text;
 
 /// Turns beyond this \[rad\] have axes whose sign noise decides; they are not asked for the axis in the camera.
 const HALF_TURN_RAD: f64 = 150f64.to_radians();
@@ -71,34 +71,34 @@ impl PartialHandEye {
     }
 }
 
-impl fmt::Display for PartialHandEye {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mount = self.mount_name();
-        let target = if mount == "tip" { "base" } else { "tip" };
+impl PartialHandEye {
+    /// What is known and what stays open, in a sentence.
+    pub fn text(&self) -> Text {
+        let (mount, target) = match self.mode {
+            Mode::EyeInHand => (text!("tip"), text!("base")),
+            Mode::EyeToHand => (text!("base"), text!("tip")),
+        };
         let list = |v: Vector3<f64>, digits: usize| format!("[{:.digits$} {:.digits$} {:.digits$}]", v.x, v.y, v.z);
         let sigma = Vector3::from(self.rotation_sigma_rad).map(f64::to_degrees);
         let q = self.rotation.coords;
         let (a, b) = (self.across[0].into_inner(), self.across[1].into_inner());
-        write!(
-            f,
-            "all rotations are about the same axis {axis} of the {mount}: the place of the camera along it stays open \
-             ({seen} in camera axes), and with it that of the target along the same axis in the {target}; add views turned \
-             by 30° or more about an axis across it. Five of six numbers are determined: rotation_xyzw \
-             [{:.6} {:.6} {:.6} {:.6}] ± {} ° (camera x y z); place in the {mount} along {}: {:.3} ± {:.3} mm, along {}: \
-             {:.3} ± {:.3} mm",
-            q.x,
-            q.y,
-            q.z,
-            q.w,
-            list(sigma, 4),
-            list(a, 4),
-            self.place_m[0] * 1e3,
-            self.place_covariance[(0, 0)].sqrt() * 1e3,
-            list(b, 4),
-            self.place_m[1] * 1e3,
-            self.place_covariance[(1, 1)].sqrt() * 1e3,
+        let place =
+            |i: usize| format!("{:.3} ± {:.3} mm", self.place_m[i] * 1e3, self.place_covariance[(i, i)].sqrt() * 1e3);
+        text!(
+            "all rotations are about the same axis {axis} of the {mount}: the position of the camera along it is not \
+             determined ({seen} in camera axes), nor that of the target along the same axis in the {target}; add views turned \
+             by 30° or more about an axis across it. Five of six numbers are determined: rotation_xyzw {rotation} ± {sigma} ° \
+             (camera x y z); position in the {mount} along {a}: {place_a}, along {b}: {place_b}",
             axis = list(self.open_axis.into_inner(), 4),
+            mount = mount,
+            target = target,
             seen = list(self.open_axis_in_camera.into_inner(), 4),
+            rotation = format!("[{:.6} {:.6} {:.6} {:.6}]", q.x, q.y, q.z, q.w),
+            sigma = list(sigma, 4),
+            a = list(a, 4),
+            place_a = place(0),
+            b = list(b, 4),
+            place_b = place(1),
         )
     }
 }

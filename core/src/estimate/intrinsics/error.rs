@@ -4,7 +4,7 @@ use crate::geometry::camera::{CameraError, FoldsBack};
 use crate::geometry::planar_pose::PoseError;
 
 /// Why there is no calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum IntrinsicsError {
     /// Not enough views.
@@ -71,7 +71,7 @@ pub enum IntrinsicsError {
     )]
     NotACamera {
         /// What is wrong with them.
-        reason: String,
+        reason: &'static str,
     },
     /// The work was cancelled.
     #[error("the calibration of the camera was cancelled")]

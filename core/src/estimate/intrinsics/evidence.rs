@@ -89,7 +89,7 @@ impl Evidence {
         for (index, (view, pose)) in problem.views.iter().zip(&estimate.poses).enumerate() {
             problem.check_cancel()?;
             let seen = seen(view, problem.board, &estimate.shape, &estimate.intrinsics);
-            let behind = |_| IntrinsicsError::NotACamera { reason: "a corner is not in front of it".into() };
+            let behind = |_| IntrinsicsError::NotACamera { reason: "a corner is not in front of it" };
             let equations = PoseEquations::new(&seen, pose, columns).map_err(behind)?;
             cost += equations.squared_px;
             let (_, rest) = split(&equations).ok_or(PoseError::CollinearCorners { view: index })?;

@@ -37,7 +37,7 @@ pub(super) fn inverse(information: &DMatrix<f64>) -> Result<DMatrix<f64>, Intrin
     // Parameters differ in size by many orders; scaled to unit diagonal the eigenvalues can be compared.
     let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (scale[i] * scale[j]));
     if scaled.iter().any(|v| !v.is_finite()) {
-        return Err(IntrinsicsError::NotACamera { reason: "its equations are not numbers".into() });
+        return Err(IntrinsicsError::NotACamera { reason: "its equations are not numbers" });
     }
     let eigen = SymmetricEigen::new(scaled);
     let vectors = &eigen.eigenvectors;

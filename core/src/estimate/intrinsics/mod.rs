@@ -233,7 +233,7 @@ fn first_optimum(
             return Ok(found);
         }
     }
-    Err(IntrinsicsError::NotACamera { reason: "no start led to an optimum".into() })
+    Err(IntrinsicsError::NotACamera { reason: "no start led to an optimum" })
 }
 
 fn optimum_from(problem: &Problem<'_>, camera: Intrinsics) -> Result<Option<(Estimate, usize)>, IntrinsicsError> {

@@ -4,7 +4,7 @@ use super::MAX_JOINTS;
 use crate::estimate::handeye::HandEyeError;
 
 /// What is wrong with a joint.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum JointDefect {
     /// NaN or infinite.
@@ -32,7 +32,7 @@ pub enum JointDefect {
 }
 
 /// Why an arm, or joint values with it, cannot be computed with.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ArmError {
     /// No joints, or more than any arm has.

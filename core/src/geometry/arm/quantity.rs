@@ -44,6 +44,8 @@ impl fmt::Display for JointQuantity {
     }
 }
 
+crate::plain_values!(JointQuantity);
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,12 +11,13 @@ const DIRECTIONS: u32 = 72;
 const STEPS: u32 = 1000;
 
 /// The lens model turns back within the image, so that pixels beyond have no ray, or that of another pixel.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
 #[error(
-    "the {} distortion {:?} folds back {radius_px:.0} px from the principal point, inside of the image, which reaches \
+    "the {model} distortion {coefficients:?} folds back {radius_px:.0} px from the principal point, inside of the image, which reaches \
      {reach_px:.0} px: that is no lens; check order and signs of the coefficients, focal lengths and image size, or \
      estimate the camera again with corners out to the edges of the image or with a lens model of fewer coefficients",
-    distortion.name(), distortion.coefficients()
+    model = distortion.name(),
+    coefficients = distortion.coefficients()
 )]
 pub struct FoldsBack {
     /// The model with its coefficients.

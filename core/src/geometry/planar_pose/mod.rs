@@ -51,7 +51,7 @@ const SAME_ROTATION: f64 = 1e-4;
 const POSSIBLE_EXCESS: f64 = 4.75 * 4.75;
 
 /// Why corners have no pose.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum PoseError {
     /// The distance between points is not a length.
@@ -61,7 +61,7 @@ pub enum PoseError {
         square_m: f64,
     },
     /// Not enough corners.
-    #[error("view {view} has {got} corners, {need} are needed; leave it out or detect it again")]
+    #[error("corners in view {view}: {got}, {need} are needed; leave it out or detect it again")]
     TooFewCorners {
         /// Index of the view, 0 where there is only one.
         view: usize,

@@ -19,11 +19,11 @@ const FARTHEST_M: f64 = 10.0;
 const FASTEST_M_S: f64 = 20.0;
 
 /// What is wrong with a file of surroundings, in one line.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum SurroundingsError {
     /// The file system does not give it.
-    #[error("{} cannot be read: {source}", file.display())]
+    #[error("{file} cannot be read: {source}", file = file.display())]
     Unreadable {
         /// The file.
         file: PathBuf,
@@ -31,7 +31,7 @@ pub enum SurroundingsError {
         source: std::io::Error,
     },
     /// Not TOML, or an unknown or missing key.
-    #[error("{}: {message}", file.display())]
+    #[error("{file}: {message}", file = file.display())]
     Syntax {
         /// The file.
         file: PathBuf,
@@ -39,7 +39,7 @@ pub enum SurroundingsError {
         message: String,
     },
     /// A value that makes no sense.
-    #[error("{}, {entry}: {fault}", file.display())]
+    #[error("{file}, {entry}", file = file.display(), entry = entry.with_fault(fault))]
     Entry {
         /// The file.
         file: PathBuf,

@@ -1,16 +1,17 @@
 //! What can be wrong with a dataset folder.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::arm::ArmError;
 use crate::project::files::image_file::ImageFileError;
+use crate::text;
+use crate::wording::Text;
 
 /// What is wrong, in which file, and in which of its rows. One line of text: `FILE, row N: what, and what to do`.
 ///
 /// The file could not be used as input: a command line ends with code 2.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", Place { file, row: *row })]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[error("{place}: {problem}", place = place(file, *row))]
 #[non_exhaustive]
 pub struct DatasetError {
     /// The file or folder.
@@ -27,26 +28,18 @@ impl DatasetError {
     }
 }
 
-/// Prints the place of an error on one line whatever the file is called.
-struct Place<'a> {
-    file: &'a Path,
-    row: Option<usize>,
-}
-
-impl fmt::Display for Place<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = self.file.display().to_string();
-        if name.contains(char::is_control) {
-            write!(f, "{name:?}")?;
-        } else {
-            f.write_str(&name)?;
-        }
-        self.row.map_or(Ok(()), |row| write!(f, ", row {row}"))
+/// The place of an error on one line, whatever the file is called.
+fn place(file: &Path, row: Option<usize>) -> Text {
+    let name = file.display().to_string();
+    let file = if name.contains(char::is_control) { format!("{name:?}") } else { name };
+    match row {
+        Some(row) => text!("{file}, row {row}", file = file, row = row),
+        None => text!("{file}", file = file),
     }
 }
 
 /// A defect of a dataset folder.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum DatasetProblem {
     /// The file system says no.
@@ -237,7 +230,7 @@ pub enum DatasetProblem {
         source: ImageFileError,
     },
     /// Not the size of the others.
-    #[error("image {name:?} is {} px, but {others} {} px: a data set is of one camera", Size(*got), Size(*need))]
+    #[error("image {name:?} is {got} px, but {others} {need} px: a data set is of one camera", got = size(*got), need = size(*need))]
     ImageSize {
         /// Its name in the table.
         name: String,
@@ -269,7 +262,7 @@ pub enum DatasetProblem {
         rows: usize,
     },
     /// A corner beside the image it is said to be in.
-    #[error("({u_px}, {v_px}) is outside of the image of {} px", Size(*size))]
+    #[error("({u_px}, {v_px}) is outside of the image of {of} px", of = self::size(*size))]
     OutsideImage {
         /// Column in pixels.
         u_px: f64,
@@ -280,12 +273,8 @@ pub enum DatasetProblem {
     },
 }
 
-struct Size((u32, u32));
-
-impl fmt::Display for Size {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}×{}", self.0.0, self.0.1)
-    }
+fn size((width, height): (u32, u32)) -> String {
+    format!("{width}×{height}")
 }
 
 /// What a cell says, short enough for a message.

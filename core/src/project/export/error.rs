@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::project::result::ResultProblem;
 
 /// Why a result was not exported.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ExportError {
     /// No format of that name.
@@ -106,7 +106,7 @@ pub enum ExportError {
     },
     /// Where the optical frame is said to be is no place.
     #[error(
-        "the optical frame in the camera link, {translation_m:?} m and {rotation_xyzw:?} xyzw, is no pose: it needs \
+        "the optical frame in the camera link, {translation_m:?} m and {rotation_xyzw:?} xyzw, is not a pose: it needs \
          finite numbers and a unit quaternion"
     )]
     BadCameraLink {
@@ -119,7 +119,7 @@ pub enum ExportError {
     #[error("the result cannot be exported: {0}")]
     BadResult(ResultProblem),
     /// The file system says no.
-    #[error("{}: cannot be written: {problem}", file.display())]
+    #[error("{file}: cannot be written: {problem}", file = file.display())]
     Io {
         /// The file or folder.
         file: PathBuf,
@@ -127,7 +127,7 @@ pub enum ExportError {
         problem: String,
     },
     /// The file does not say what the result says: a defect of this program.
-    #[error("{}: reads back differently: {difference}; please report this", file.display())]
+    #[error("{file}: reads back differently: {difference}; please report this", file = file.display())]
     ReadBack {
         /// The file.
         file: PathBuf,

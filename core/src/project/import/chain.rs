@@ -9,6 +9,8 @@ use super::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Sta
 use crate::geometry::arm::urdf::Urdf;
 use crate::geometry::arm::{Arm, ArmKind, JointKind};
 use crate::project::files::bounds::Bounds;
+use crate::text;
+use crate::wording::Text;
 
 /// What ROS calls the joints of Universal Robots, from the base to the tip. Its messages have them in the order of letters.
 const ROS_NAMES_OF_UR: [&str; 6] =
@@ -23,7 +25,7 @@ const ROS_NAMES_OF_UR: [&str; 6] =
 /// # Errors
 /// [`ImportError::Arm`].
 pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportError> {
-    let fail = |why: String| ImportError::Arm { arm: arm.to_owned(), why };
+    let fail = |why: Text| ImportError::Arm { arm: arm.to_owned(), why };
     let chain = Chain::of(arm, &recording.root, &recording.bounds).map_err(fail)?;
     let is_of_arm = |series: &JointSeries| chain.row_of(series).is_some();
     // Joint values by name say what they are; numbers without names are looked at where there are no others.
@@ -31,8 +33,9 @@ pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportErr
         (recording.joints.iter().collect(), recording.rows.iter().filter(|s| is_of_arm(s)).collect());
     if named.is_empty() && rows.is_empty() {
         let count = chain.arm.joint_count();
-        return Err(fail(format!(
-            "there are no joint values in this recording, nor rows of {count} numbers: leave `arm` out"
+        return Err(fail(text!(
+            "there are no joint values in this recording, nor rows of {count} numbers: leave `arm` out",
+            count = count
         )));
     }
     let mut out = recording.clone();
@@ -53,7 +56,7 @@ pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportErr
         }
     }
     if out.tracks.iter().all(|track| track.role == Role::Target) {
-        return Err(fail(troubles.join("; ")));
+        return Err(fail(Text::verbatim(troubles.join("; "))));
     }
     out.beliefs.push(format!("poses are computed from joint values by the chain of {}", chain.name));
     out.warnings.extend(troubles);
@@ -69,7 +72,7 @@ struct Chain {
 }
 
 impl Chain {
-    fn of(text: &str, root: &Path, bounds: &Bounds) -> Result<Self, String> {
+    fn of(text: &str, root: &Path, bounds: &Bounds) -> Result<Self, Text> {
         let own = |arm: &Arm| -> Vec<String> { arm.joints().iter().map(|joint| joint.name.clone()).collect() };
         if let Some(kind) = ArmKind::ALL.into_iter().find(|kind| kind.name() == text) {
             let arm = kind.arm();
@@ -83,7 +86,7 @@ impl Chain {
             match part.split_once('=') {
                 Some(("base", link)) => base = Some(link),
                 Some(("tip", link)) => tip = Some(link),
-                _ => return Err(format!("{part:?} is neither base=LINK nor tip=LINK")),
+                _ => return Err(text!("“{part}” is neither base=LINK nor tip=LINK", part = part)),
             }
         }
         // Where files may not be named, it is said of all of them that there are none.
@@ -91,9 +94,9 @@ impl Chain {
         let path = [Path::new(file).to_path_buf(), root.join(file)].into_iter().find(may_be);
         let Some(path) = path else {
             let built_in: Vec<&str> = ArmKind::ALL.into_iter().map(ArmKind::name).collect();
-            return Err(format!("there is no such URDF file, and built in are {}", built_in.join(", ")));
+            return Err(text!("there is no such URDF file, and built in are {arms}", arms = built_in.join(", ")));
         };
-        let arm = Urdf::read(&path).and_then(|urdf| urdf.arm(base, tip)).map_err(|e| e.to_string())?;
+        let arm = Urdf::read(&path).and_then(|urdf| urdf.arm(base, tip))?;
         Ok(Self { name: text.to_owned(), joint_names: vec![own(&arm)], arm })
     }
 

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use crate::budget::Spent;
 use crate::estimate::clock_offset::ClockOffsetError;
+use crate::text;
+use crate::wording::Text;
 
 /// Why a recording cannot be read or a data set not be written. One line each: what, where, and what to do.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ImportError {
     /// The file system says no.
-    #[error("{}: cannot be read: {why}", file.display())]
+    #[error("{file}: cannot be read: {why}", file = file.display())]
     Unreadable {
         /// The file or folder.
         file: PathBuf,
@@ -18,7 +20,7 @@ pub enum ImportError {
         why: String,
     },
     /// More than any recording has.
-    #[error("{}: {what}: at most {limit} are read; name the folder of one recording", file.display())]
+    #[error("{file}: {what}: at most {limit} are read; name the folder of one recording", file = file.display())]
     TooMuch {
         /// The file or folder.
         file: PathBuf,
@@ -28,7 +30,7 @@ pub enum ImportError {
         limit: u64,
     },
     /// It takes more time, or unpacks to more, than a person has allowed.
-    #[error("{}: {why}{}", file.display(), allowing(*why))]
+    #[error("{file}: {why}{allowing}", file = file.display(), allowing = allowing(*why))]
     Stopped {
         /// The folder or file.
         file: PathBuf,
@@ -36,12 +38,12 @@ pub enum ImportError {
         why: Spent,
     },
     /// It is a data set or a session already.
-    #[error("{} is a data set or a session already: solve it with `handeye calibrate`", .0.display())]
+    #[error("{file} is a data set or a session already: solve it with `handeye calibrate`", file = .0.display())]
     AlreadyADataset(PathBuf),
     /// There is nothing that could be robot poses.
     #[error(
-        "{}: no series of at least {need} poses was found (tables, JSON, YAML, XML, npz and bags of ROS are read): {seen}",
-        folder.display()
+        "{folder}: no series of at least {need} poses was found (tables, JSON, YAML, XML, npz and bags of ROS are read): {seen}",
+        folder = folder.display()
     )]
     NoPoses {
         /// The folder.
@@ -53,10 +55,10 @@ pub enum ImportError {
     },
     /// The robot was at one place all the time.
     #[error(
-        "{}: the robot did not move: the {count} poses of {series} are {}; a calibration needs poses that are turned by 30° or more \
+        "{folder}: the robot did not move: the {count} poses of {series} are {alike}; a calibration needs poses that are turned by 30° or more \
          about two different axes",
-        folder.display(),
-        alike(*spread_mm_deg)
+        folder = folder.display(),
+        alike = alike(*spread_mm_deg)
     )]
     DidNotMove {
         /// The folder.
@@ -70,9 +72,9 @@ pub enum ImportError {
     },
     /// No way to put the files together has views to solve with.
     #[error(
-        "{}: no pairing has {need} views with a pose of the robot and the target in sight, turned differently: look at the \
+        "{folder}: no pairing has {need} views with a pose of the robot and the target in sight, turned differently: look at the \
          target, at `images` and at `poses`",
-        folder.display()
+        folder = folder.display()
     )]
     NoViews {
         /// The folder.
@@ -86,7 +88,7 @@ pub enum ImportError {
         /// As it was named.
         arm: String,
         /// What is wrong.
-        why: String,
+        why: Text,
     },
     /// Images of a moving robot have stamps of a clock that cannot be related to the robot's.
     #[error("the images {images} were taken while {poses} moved, and their clocks cannot be related: {why}")]
@@ -112,10 +114,10 @@ pub enum ImportError {
     #[error("nothing is left to try with {0}: these choices exclude each other, or the recording does not have them")]
     NothingLeft(String),
     /// The folder to write is there and has something in it.
-    #[error("{}: is not empty: an import is written into a new folder, name another one", .0.display())]
+    #[error("{file}: is not empty: an import is written into a new folder, name another one", file = .0.display())]
     OutNotEmpty(PathBuf),
     /// It could not be written.
-    #[error("{}: cannot be written: {why}", file.display())]
+    #[error("{file}: cannot be written: {why}", file = file.display())]
     Unwritable {
         /// The file.
         file: PathBuf,
@@ -131,14 +133,19 @@ impl ImportError {
 }
 
 /// What to do about it.
-fn allowing(why: Spent) -> &'static str {
+fn allowing(why: Spent) -> Text {
     match why {
-        Spent::Cancelled => "",
-        Spent::Time(_) => ": name the folder or file of one recording, or allow more time with --time SECONDS",
-        Spent::Unpacked(_) => ": unpack them yourself, or allow more with --unpack GIB",
+        Spent::Cancelled => Text::default(),
+        Spent::Time(_) => {
+            text!(": name the folder or file of one recording, or allow more time with --time SECONDS")
+        }
+        Spent::Unpacked(_) => text!(": unpack them yourself, or allow more with --unpack GIB"),
     }
 }
 
-fn alike(spread_mm_deg: Option<(f64, f64)>) -> String {
-    spread_mm_deg.map_or_else(|| "all the same".into(), |(mm, deg)| format!("the same within {mm:.2} mm and {deg:.2}°"))
+fn alike(spread_mm_deg: Option<(f64, f64)>) -> Text {
+    spread_mm_deg.map_or_else(
+        || text!("all the same"),
+        |(mm, deg)| text!("the same within {mm} mm and {deg}°", mm = format!("{mm:.2}"), deg = format!("{deg:.2}")),
+    )
 }

@@ -10,8 +10,8 @@ use crate::project::files::image_file::one_line;
 use crate::project::files::{atomic_file, json_text};
 
 /// Why a result file could not be read or written.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", file.display())]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[error("{file}: {problem}", file = file.display())]
 #[non_exhaustive]
 pub struct ResultError {
     /// The file.
@@ -28,7 +28,7 @@ impl ResultError {
 }
 
 /// What is wrong with a result.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum ResultProblem {
     /// The file system does not give it.

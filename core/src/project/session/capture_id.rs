@@ -16,6 +16,8 @@ impl fmt::Display for CaptureId {
     }
 }
 
+crate::plain_values!(CaptureId);
+
 impl CaptureId {
     /// Stands for a capture without a number while an old session is read.
     pub(super) fn none() -> Self {

@@ -156,6 +156,8 @@ impl fmt::Display for TaughtChange {
     }
 }
 
+crate::plain_values!(TaughtChange);
+
 /// “capture 3” or “2 captures”.
 struct Captures<'a>(&'a [CaptureId]);
 

@@ -28,7 +28,7 @@ pub enum TaughtChange {
 }
 
 /// Why a change is refused. The document is then as before.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum EditError {
     /// There is no such capture, or no longer.

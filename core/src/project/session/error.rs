@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use super::edit_error::EditError;
 
 /// What is wrong, and with which file or folder.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", file.display())]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[error("{file}: {problem}", file = file.display())]
 #[non_exhaustive]
 pub struct SessionError {
     /// The file or folder.
@@ -40,7 +40,7 @@ impl SessionError {
 }
 
 /// What is wrong with a session.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum SessionProblem {
     /// There is something in the folder, and it is not a session.

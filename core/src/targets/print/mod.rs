@@ -15,7 +15,7 @@ pub use sheet::{Page, Sheet, Text};
 use crate::targets::{BadTarget, TargetSpec};
 
 /// Why a target cannot be printed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum PrintError {
     /// A number of the target is out of range.

@@ -67,6 +67,8 @@ impl fmt::Display for Page {
     }
 }
 
+crate::plain_values!(Page);
+
 impl FromStr for Page {
     type Err = String;
 

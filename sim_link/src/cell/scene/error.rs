@@ -3,13 +3,15 @@
 use handeye_core::geometry::arm::urdf::UrdfError;
 
 use super::{ShippedScene, locate};
+use handeye_core::text;
+use handeye_core::wording::Text;
 
 /// Why a scene cannot be used.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
-    #[error("the scene file {file} cannot be read{}", or_a_name(file))]
+    #[error("the scene file {file} cannot be read{scenes}", scenes = or_a_name(file))]
     Read {
         /// Path as given.
         file: String,
@@ -17,7 +19,7 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// Not TOML, an unknown field, or a value of the wrong type.
-    #[error("{message}{}. {}", in_field(field), place(file, *line))]
+    #[error("{message}{at}. {place}", at = in_field(field), place = place(file, *line))]
     Syntax {
         /// Path as given.
         file: String,
@@ -29,7 +31,7 @@ pub enum SceneError {
         message: String,
     },
     /// The file of the arm is missing, is none, or has no such chain.
-    #[error("robot.model: {why}. Name a built-in arm, or a URDF file with its base and tip links. {}", place(file, *line))]
+    #[error("robot.model: {why}. Name a built-in arm, or a URDF file with its base and tip links. {place}", place = place(file, *line))]
     Arm {
         /// Path of the scene as given.
         file: String,
@@ -39,7 +41,7 @@ pub enum SceneError {
         why: Box<UrdfError>,
     },
     /// A number out of its range.
-    #[error("{field} is {value}, it must be {need}. {}", place(file, *line))]
+    #[error("{field} is {value}, it must be {need}. {place}", place = place(file, *line))]
     Field {
         /// Path as given.
         file: String,
@@ -55,22 +57,22 @@ pub enum SceneError {
 }
 
 /// Who names no folder and no ending may have meant a scene that comes with the program.
-fn or_a_name(file: &str) -> String {
+fn or_a_name(file: &str) -> Text {
     if file.contains(['/', '\\', '.']) {
-        return String::new();
+        return Text::default();
     }
     let names: Vec<&str> = ShippedScene::ALL.into_iter().map(ShippedScene::name).collect();
-    format!(" (scenes that come with the program: {})", names.join(", "))
+    text!(" (scenes that come with the program: {scenes})", scenes = names.join(", "))
 }
 
-fn in_field(field: &str) -> String {
-    if field.is_empty() { String::new() } else { format!(" in `{field}`") }
+fn in_field(field: &str) -> Text {
+    if field.is_empty() { Text::default() } else { text!(" in `{field}`", field = field) }
 }
 
-fn place(file: &str, line: Option<usize>) -> String {
+fn place(file: &str, line: Option<usize>) -> Text {
     match line {
-        Some(line) => format!("File: {file}, line {line}"),
-        None => format!("File: {file}"),
+        Some(line) => text!("File: {file}, line {line}", file = file, line = line),
+        None => text!("File: {file}", file = file),
     }
 }
 

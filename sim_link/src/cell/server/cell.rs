@@ -19,14 +19,14 @@ pub const MAX_SIGNAL_BYTES: usize = 64 << 10;
 const MAX_LOG: usize = 200;
 
 /// Why a cell cannot be built.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum BuildError {
     /// The scene is not usable.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The scene has more objects than a world takes.
-    #[error("the scene does not fit: {0}")]
+    #[error("the scene does not fit: {why}", why = .0.to_string())]
     World(#[from] WorldError),
 }
 

@@ -54,7 +54,7 @@ const SLOWER_STEPS: usize = 6;
 const AT_END: f64 = 1e-9;
 
 /// Why a jog goes no further.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum JogObstacle {
     /// A joint is at the end of its range.

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::client::constants;
+use handeye_core::text;
+use handeye_core::wording::Text;
 
 /// Where the parts of the cell are in the scene: object paths as `sim.getObject` takes them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -66,16 +68,16 @@ pub enum CellPart {
 }
 
 /// What is no assignment of a path.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Eq, Error, crate::wording::Said)]
 pub enum BadCellPath {
     /// No part of that name.
-    #[error("{0:?} is no part of a cell: arm, joints, tip, target, camera, depth and board are")]
+    #[error("{0:?} is not a part of a cell: those are arm, joints, tip, target, camera, depth and board")]
     Part(String),
     /// Nothing to set.
     #[error("{0:?} is not PART=PATH, such as tip=/Panda/Tip")]
     NotSet(String),
     /// Not the path of an object.
-    #[error("{0:?} is no path of an object: one begins with / and has at most 500 characters, such as /Panda/Tip")]
+    #[error("{0:?} is not the path of an object: it begins with / and has at most 500 characters, such as /Panda/Tip")]
     Path(String),
 }
 
@@ -101,25 +103,25 @@ impl CellPart {
     }
 
     /// What it is, in words.
-    pub fn what(self) -> &'static str {
+    pub fn what(self) -> Text {
         match self {
-            Self::Arm => "base of the arm",
-            Self::Joints => "joint of the arm",
-            Self::Tip => "tip",
-            Self::Target => "target dummy of motions",
-            Self::Camera => "colour sensor",
-            Self::Depth => "depth sensor",
-            Self::Board => "board",
+            Self::Arm => text!("base of the arm"),
+            Self::Joints => text!("joint of the arm"),
+            Self::Tip => text!("tip"),
+            Self::Target => text!("target dummy of motions"),
+            Self::Camera => text!("colour sensor"),
+            Self::Depth => text!("depth sensor"),
+            Self::Board => text!("board"),
         }
     }
 
     /// The type of object that it is, see [`crate::client::constants`], and what several of those are called.
-    pub(in crate::client) fn kind(self) -> (i64, &'static str) {
+    pub(in crate::client) fn kind(self) -> (i64, Text) {
         match self {
-            Self::Arm | Self::Board => (constants::OBJECT_SHAPE, "shapes"),
-            Self::Joints => (constants::OBJECT_JOINT, "joints"),
-            Self::Tip | Self::Target => (constants::OBJECT_DUMMY, "dummies"),
-            Self::Camera | Self::Depth => (constants::OBJECT_VISION_SENSOR, "vision sensors"),
+            Self::Arm | Self::Board => (constants::OBJECT_SHAPE, text!("shapes")),
+            Self::Joints => (constants::OBJECT_JOINT, text!("joints")),
+            Self::Tip | Self::Target => (constants::OBJECT_DUMMY, text!("dummies")),
+            Self::Camera | Self::Depth => (constants::OBJECT_VISION_SENSOR, text!("vision sensors")),
         }
     }
 

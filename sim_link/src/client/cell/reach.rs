@@ -5,6 +5,7 @@ use handeye_core::geometry::arm::{
     ArmError, ArmFrames, ArmKind, DlsOptions, IkError, Joint, JointKind, JointRange, JointValues, MAX_JOINTS,
 };
 use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::wording::Text;
 use nalgebra::{Isometry3, Matrix6xX, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +42,7 @@ pub struct ArmKinematics {
 }
 
 /// Why the kinematics of an arm is not known.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum UnknownKinematics {
     /// Where the arm stands is not known.
@@ -71,7 +72,7 @@ pub enum UnknownKinematics {
     #[error("the arm could not be measured: {reason}")]
     Unreadable {
         /// What it said.
-        reason: String,
+        reason: Text,
     },
     /// It did not stand still.
     #[error("the arm moved while its axes were read; let it stand and connect again")]
@@ -205,7 +206,7 @@ impl Arm {
     pub fn kinematics(&mut self) -> Result<Result<ArmKinematics, UnknownKinematics>, LinkError> {
         match self.measured_kinematics() {
             Err(error) if !error.is_connection_loss() => {
-                Ok(Err(UnknownKinematics::Unreadable { reason: error.to_string() }))
+                Ok(Err(UnknownKinematics::Unreadable { reason: error.into() }))
             }
             outcome => outcome,
         }

@@ -94,9 +94,9 @@ pub struct FollowPlace {
 }
 
 /// There is no place to follow from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
 #[error(
-    "of {tried} places that show the whole board none has room for the arm to go along with it: move the board away from \
+    "of {tried} places that show the whole board none has room for the arm to follow it: move the board away from \
      the column of the arm, and not to the end of its reach"
 )]
 pub struct NoPlace {

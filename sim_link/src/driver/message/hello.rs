@@ -46,6 +46,8 @@ impl fmt::Display for Ability {
     }
 }
 
+handeye_core::plain_values!(Ability);
+
 /// A joint as the driver's `hello` has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointMessage {

@@ -55,7 +55,7 @@ fn of_json(text: &str, columns: &[&str]) -> Result<Vec<String>, String> {
         _ => return Err("neither a list of numbers nor an object".into()),
     };
     let number =
-        |cell: &Value| cell.as_f64().map(|number| number.to_string()).ok_or_else(|| format!("{cell} is no number"));
+        |cell: &Value| cell.as_f64().map(|number| number.to_string()).ok_or_else(|| format!("{cell} is not a number"));
     cells.into_iter().map(number).collect()
 }
 

@@ -161,7 +161,9 @@ impl Scene {
             let stamp_s = transform.header.stamp.seconds();
             let (parent, child) = (transform.header.frame_id.as_str(), transform.child_frame_id.as_str());
             let Some(pose) = transform.parent_from_child() else {
-                self.remark(format!("tf: the quaternion from {parent:?} to {child:?} is no rotation; it is not used"));
+                self.remark(format!(
+                    "tf: the quaternion from {parent:?} to {child:?} is not a rotation; it is not used"
+                ));
                 continue;
             };
             if !self.tree.insert(parent, child, stamp_s, pose, is_static) {

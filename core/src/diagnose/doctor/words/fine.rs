@@ -249,7 +249,7 @@ fn common(judged: &Judged) -> Vec<Evidence> {
 /// number for that noise, which is that of the answer.
 fn worth(judged: &Judged) -> Text {
     if !judged.significant {
-        return text!("Chance explains it.");
+        return text!("It is within chance.");
     }
     let held_out = judged.held_out.as_ref().map(|(without, with)| {
         text!(

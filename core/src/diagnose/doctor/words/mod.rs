@@ -54,8 +54,7 @@ pub(super) fn behind_the_camera(sight: &SessionViews) -> Option<Finding> {
         return None;
     }
     let text = text!(
-        "In {behind} of {views} views the target poses put the target behind the camera: they are target_from_camera, or the \
-         camera's z axis looks backwards. Say pose = \"target_from_camera\" in [target], or turn the axes to z forward, y down.",
+        "In {behind} of {views} views the target poses put the target behind the camera: they are target_from_camera, or the camera's z axis looks backwards. Write pose = \"target_from_camera\" in [target], or turn the axes to z forward, y down.",
         behind = behind,
         views = sight.views.len()
     );
@@ -146,7 +145,7 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
     let freedom = 0.5 * (6.0 * gross.views as f64 - 12.0).max(1.0);
     let ratio = (given_m.max(1e-9) / so_m.max(1e-9)).ln();
     let so_read = text!(
-        "So read, the board comes together within {so} mm, as stated within {given} mm (median view).",
+        "Read this way, the views agree on the position of the board within {so} mm; as stated, within {given} mm (median view).",
         so = shown(so_mm, 2),
         given = shown(given_mm, 2)
     );
@@ -318,8 +317,7 @@ pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
 
 pub(super) fn hopeless(sight: &SessionViews, misfit_m: f64) -> Finding {
     let text = text!(
-        "Robot poses and images contradict each other: the board comes together within {misfit} mm only, at a distance of \
-         {distance} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain \
+        "Robot poses and images contradict each other: the views agree on the position of the board within {misfit} mm only, at a distance of {distance} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain \
          it. Check that the poses belong to these images, and the axes and angles that the poses were made from.",
         misfit = format!("{:.0}", misfit_m * 1e3),
         distance = format!("{:.0}", sight.distance_m * 1e3)
@@ -333,20 +331,18 @@ pub(super) fn implausible(robot_m: f64, robot_rad: f64, beside: bool) -> Finding
     let (mm, deg) = (robot_m * 1e3, robot_rad.to_degrees());
     let what = if beside {
         text!(
-            "Even with what else was found the robot poses scatter about what the images say by more than an arm errs (2 mm and \
-             0.5° per axis)."
+            "Even allowing for what else was found the robot poses scatter about what the images say by more than the error of an arm (2 mm and 0.5° per axis)."
         )
     } else {
         text!(
-            "The robot poses scatter by {mm} mm and {deg}° per axis about what the images say, more than an arm errs \
-             (below 2 mm and 0.5°).",
+            "The robot poses scatter by {mm} mm and {deg}° per axis about what the images say, more than the error of an arm (below 2 mm and 0.5°).",
             mm = shown(mm, 2),
             deg = shown(deg, 3)
         )
     };
     let advice = text!(
         "The arm may have been moving, poses and images may not be of the same moment, or the arm's own geometry is wrong. \
-         Capture again at rest; no solver can mend it."
+         Capture again at rest; no solver can correct it."
     );
     let text = Text::sentences([what, advice]);
     let finding = Finding::new(FindingCode::InconsistentPoses, Severity::Warning, text);

@@ -19,7 +19,7 @@ pub use obstacle::Obstacle;
 pub(super) use ur::UrGeometry;
 
 /// Why no joint values put the arm at a pose.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum IkError {
     /// No configuration reaches it, whatever the limits.
@@ -30,9 +30,9 @@ pub enum IkError {
     },
     /// Configurations reach it, but all of them have a joint out of its range.
     #[error(
-        "this pose needs joint {} at {needed_deg:.1}°, outside its range of {min_deg:.1}° to {max_deg:.1}°, and all \
+        "this pose needs joint {number} at {needed_deg:.1}°, outside its range of {min_deg:.1}° to {max_deg:.1}°, and all \
          other configurations are outside too: turn the tip or move it towards the middle of the workspace",
-        joint + 1
+        number = joint + 1
     )]
     OutsideLimits {
         /// The joint, counted from 0, of the configuration that exceeds its limits least.

@@ -1,12 +1,15 @@
 //! What keeps an arm of Universal Robots from a pose.
 
-use std::fmt;
-
 /// What is in the way of a goal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum Obstacle {
     /// The goal is past the stretched arm.
+    #[error(
+        "its wrist would be {needed_m:.4} m from the shoulder and the arm reaches {reach_m:.4} m: bring it at least {excess:.1} \
+         mm closer to the robot",
+        excess = (needed_m - reach_m) * 1e3
+    )]
     TooFar {
         /// Distance from shoulder to the wrist that the goal asks for.
         needed_m: f64,
@@ -14,6 +17,11 @@ pub enum Obstacle {
         reach_m: f64,
     },
     /// The wrist would be inside the folded arm.
+    #[error(
+        "its wrist would be {needed_m:.4} m from the shoulder and the folded arm cannot come closer than {least_m:.4} m: move \
+         it at least {excess:.1} mm away from the shoulder",
+        excess = (least_m - needed_m) * 1e3
+    )]
     TooNear {
         /// Distance from shoulder to the wrist that the goal asks for.
         needed_m: f64,
@@ -21,37 +29,17 @@ pub enum Obstacle {
         least_m: f64,
     },
     /// The wrist would be inside the column of the robot.
+    #[error(
+        "its wrist would be {distance_m:.4} m from the vertical axis and cannot come closer than {least_m:.4} m: move it at \
+         least {excess:.1} mm away from the robot's column",
+        excess = (least_m - distance_m) * 1e3
+    )]
     InColumn {
         /// Distance of the wrist from the vertical axis.
         distance_m: f64,
         /// The shortest there is.
         least_m: f64,
     },
-}
-
-impl fmt::Display for Obstacle {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::TooFar { needed_m, reach_m } => write!(
-                f,
-                "its wrist would be {needed_m:.4} m from the shoulder and the arm reaches {reach_m:.4} m: bring it at \
-                 least {:.1} mm closer to the robot",
-                (needed_m - reach_m) * 1e3
-            ),
-            Self::TooNear { needed_m, least_m } => write!(
-                f,
-                "its wrist would be {needed_m:.4} m from the shoulder and the folded arm cannot come closer than \
-                 {least_m:.4} m: move it at least {:.1} mm away from the shoulder",
-                (least_m - needed_m) * 1e3
-            ),
-            Self::InColumn { distance_m, least_m } => write!(
-                f,
-                "its wrist would be {distance_m:.4} m from the vertical axis and cannot come closer than {least_m:.4} \
-                 m: move it at least {:.1} mm away from the robot's column",
-                (least_m - distance_m) * 1e3
-            ),
-        }
-    }
 }
 
 impl Obstacle {

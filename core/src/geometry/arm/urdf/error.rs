@@ -1,12 +1,12 @@
 //! What can be wrong with a URDF file.
 
-use std::fmt;
-
 use crate::geometry::arm::{ArmError, MAX_JOINTS};
+use crate::text;
+use crate::wording::Text;
 
 /// What is wrong, in which file, and where in it: `FILE, line N: what, and what to do`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{}: {problem}", Place { file, line: *line })]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[error("{place}: {problem}", place = place(file, *line))]
 #[non_exhaustive]
 pub struct UrdfError {
     /// The file as it was named.
@@ -17,25 +17,17 @@ pub struct UrdfError {
     pub problem: Box<UrdfProblem>,
 }
 
-/// Prints the place of an error on one line whatever the file is called.
-struct Place<'a> {
-    file: &'a str,
-    line: Option<u32>,
-}
-
-impl fmt::Display for Place<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.file.contains(char::is_control) {
-            write!(f, "{:?}", self.file)?;
-        } else {
-            f.write_str(self.file)?;
-        }
-        self.line.map_or(Ok(()), |line| write!(f, ", line {line}"))
+/// The place of an error on one line, whatever the file is called.
+fn place(file: &str, line: Option<u32>) -> Text {
+    let file = if file.contains(char::is_control) { format!("{file:?}") } else { file.to_owned() };
+    match line {
+        Some(line) => text!("{file}, line {line}", file = file, line = line),
+        None => text!("{file}", file = file),
     }
 }
 
 /// A defect of a URDF file, or of what was asked of it.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
 #[non_exhaustive]
 pub enum UrdfProblem {
     /// The file system says no, or it is not text.
@@ -48,7 +40,7 @@ pub enum UrdfProblem {
     #[error("is xacro source, from which a URDF is made first: run `xacro FILE > robot.urdf` and name robot.urdf")]
     Xacro,
     /// Another format.
-    #[error("is no URDF: its root element is <{root}> instead of <robot>")]
+    #[error("is not a URDF: its root element is <{root}> instead of <robot>")]
     NotUrdf {
         /// The element.
         root: String,
@@ -99,19 +91,19 @@ pub enum UrdfProblem {
         link: String,
     },
     /// More than one link that the arm could stand on.
-    #[error("has {} links without a parent, {}: name the one that the arm stands on as the base link", links.len(), quoted(links))]
+    #[error("has {count} links without a parent, {links}: name the one that the arm stands on as the base link", count = links.len(), links = quoted(links))]
     SeveralRoots {
         /// All of them.
         links: Vec<String>,
     },
     /// More than one link that could carry the tool.
-    #[error("has {} links at an end, {}: name the one that is the tip", links.len(), quoted(links))]
+    #[error("has {count} links at an end, {links}: name the one that is the tip", count = links.len(), links = quoted(links))]
     SeveralLeaves {
         /// All of them.
         links: Vec<String>,
     },
     /// A name that is none of a link.
-    #[error("has no link \"{name}\"; it has {}", quoted(links))]
+    #[error("has no link \"{name}\"; it has {links}", links = quoted(links))]
     NoSuchLink {
         /// What was asked for.
         name: String,
@@ -231,9 +223,10 @@ pub enum UrdfProblem {
 }
 
 /// Names in quotes, with commas between; of very many the first.
-fn quoted(names: &[String]) -> String {
+fn quoted(names: &[String]) -> Text {
     const SHOWN: usize = 12;
     let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("\"{name}\"")).collect();
     let more = names.len().saturating_sub(SHOWN);
-    shown.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+    let shown = shown.join(", ");
+    if more > 0 { text!("{names} and {more} more", names = shown, more = more) } else { Text::verbatim(shown) }
 }
