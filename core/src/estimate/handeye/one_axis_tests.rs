@@ -123,6 +123,9 @@ fn a_calibration_about_one_axis_is_refused_with_what_it_determines_in_both_modes
         assert!(found.across.iter().all(is_across), "nothing is said along the axis");
         let text = error.to_string();
         let mount = if mode == Mode::EyeInHand { "tip" } else { "base" };
-        assert!(text.contains(&format!("of the {mount}: the place of the camera along it stays open")), "{text}");
+        assert!(
+            text.contains(&format!("of the {mount}: the position of the camera along it is not determined")),
+            "{text}"
+        );
     }
 }

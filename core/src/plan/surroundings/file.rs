@@ -432,18 +432,18 @@ joint_speed_deg_s = 30.0
     #[test]
     fn what_makes_no_sense_is_refused_with_file_entry_and_what_to_do() {
         let cases = [
-            ("size_m = [0.2, 0.3, 0.2]", "size_m = [0.2, -0.3, 0.2]", "box 1 \"fixture\"", "above 0"),
-            ("size_m = [0.2, 0.3, 0.2]", "size_m = [200, 300, 200]", "box 1 \"fixture\"", "divide millimetres"),
-            ("centre_m = [0.4, 0.1, 0.1]", "centre_m = [nan, 0.1, 0.1]", "box 1 \"fixture\"", "centre_m is not finite"),
-            ("rotation_xyzw = [0, 0, 0, 1]", "rotation_xyzw = [0, 0, 0, 2]", "box 2 \"rack\"", "unit quaternion"),
+            ("size_m = [0.2, 0.3, 0.2]", "size_m = [0.2, -0.3, 0.2]", "Box 1 “fixture”", "above 0"),
+            ("size_m = [0.2, 0.3, 0.2]", "size_m = [200, 300, 200]", "Box 1 “fixture”", "divide millimetres"),
+            ("centre_m = [0.4, 0.1, 0.1]", "centre_m = [nan, 0.1, 0.1]", "Box 1 “fixture”", "centre_m is not finite"),
+            ("rotation_xyzw = [0, 0, 0, 1]", "rotation_xyzw = [0, 0, 0, 2]", "Box 2 “rack”", "unit quaternion"),
             (
                 "rotation_xyzw = [0, 0, 0, 1]",
                 "rotation_xyzw = [0, 0, 0, 1]\nyaw_deg = 1",
-                "box 2 \"rack\"",
+                "Box 2 “rack”",
                 "one of them",
             ),
-            ("name = \"rack\"", "name = \"fixture\"", "box 2 \"fixture\"", "same name"),
-            ("name = \"rack\"", "name = \" \"", "box 2", "name is empty"),
+            ("name = \"rack\"", "name = \"fixture\"", "Box 2 “fixture”", "same name"),
+            ("name = \"rack\"", "name = \" \"", "Box 2", "name is empty"),
             ("min_m = [-1, -1, 0]", "min_m = [-1, 2, 0]", "[volume]", "along y"),
             ("tip_speed_m_s = 0.25", "tip_speed_m_s = 250", "[limits]", "divide millimetres"),
             ("joint_speed_deg_s = 30.0", "joint_speed_deg_s = 0", "[limits]", "above 0"),
