@@ -249,7 +249,7 @@ fn border_ui(ui: &mut Ui, bits: &mut Option<usize>, language: Language) {
 
 fn family_ui(ui: &mut Ui, name: &str, family: &mut Dictionary, language: Language) {
     choice_ui(ui, name, family, Dictionary::all(), |family| {
-        text!("{family} ({count})", family = family, count = family.markers()).say(language)
+        text!("{family} ({count})", family = family.to_string(), count = family.markers()).say(language)
     });
 }
 

@@ -33,7 +33,7 @@ impl Archive {
                 self.import_as(folder.path(), sample::NAME, &Bounds::within(folder.path()));
             }
             Err(error) => {
-                let why = text!("The data set was not opened: {why}", why = said_by(error));
+                let why = text!("The data set was not opened: {why}", why = error);
                 self.outlet.report(Event::SessionFailed { why });
             }
         }
