@@ -69,7 +69,7 @@ impl Kind {
             Self::Chessboard => TargetSpec::Chessboard(grid),
             Self::Circles => TargetSpec::Circles(grid),
             // The rows are half as far apart as the dots in them, and the odd number of rows tells its ends apart.
-            Self::AsymmetricCircles => TargetSpec::AsymmetricCircles(Grid { columns: 4, rows: 11, square_m: 0.02 }),
+            Self::AsymmetricCircles => TargetSpec::AsymmetricCircles(Grid { columns: 4, rows: 11, square_m: 0.018 }),
             Self::Charuco => TargetSpec::Charuco(Charuco {
                 columns: 6,
                 rows: 8,

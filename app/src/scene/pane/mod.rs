@@ -38,7 +38,7 @@ use canvas::Canvas;
 use captures::Spot;
 use eye::{Eye, Side};
 
-/// Room above and below the controls of the line over the scene [points].
+/// Room above and below the controls of the line over the scene \[points\].
 const HEADER_MARGIN: f32 = 4.0;
 /// Distance of text to the edge of the pane.
 const INSET: f32 = 10.0;
