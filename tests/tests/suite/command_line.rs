@@ -196,7 +196,7 @@ fn a_track_has_a_pose_for_every_image_and_needs_a_hand_eye_transform() {
     };
     unusable(&["--reach", "70"], "corners 0 to 69");
     unusable(&["--reach", "0", "--stand-off=-1"], "-1 mm is not a distance");
-    unusable(&["--target", "10x7"], "no chessboard");
+    unusable(&["--target", "10x7"], "is not a chessboard");
     unusable(&["--connect", "not an address"], "not an address");
     unusable(&["--json", "/no/such/folder/track.json"], "cannot be written");
     let mut without = CalibrationResult::read(&result).expect("a result");

@@ -122,6 +122,8 @@ impl RoughAnswer {
             let mut around = with_board(robot, model.hand_eye(), observations, CAREFUL_ROOM_M);
             if model.mode() == Mode::EyeInHand {
                 around.arm.carried.clone_from(&robot.arm.carried);
+                // The line of sight from there would go through the hand.
+                around.sight.clone_from(&robot.sight);
             }
             around
         });
