@@ -83,7 +83,9 @@ fn the_line_under_the_tabs_is_under_them_with_a_pointer_and_with_fingers() {
         let tab = silent.harness.get_by_role_and_label(Role::Button, "Colour").rect();
         let shapes = &silent.harness.output().shapes;
         let mut lines = Vec::new();
-        shapes.iter().for_each(|clipped| horizontals(&clipped.shape, &mut lines));
+        for clipped in shapes {
+            horizontals(&clipped.shape, &mut lines);
+        }
         let is_under = lines.iter().any(|y| (y - tab.bottom()).abs() < 1.5);
         assert!(is_under, "fingers {fingers}: the tab ends at {}, lines are at {lines:?}", tab.bottom());
     }

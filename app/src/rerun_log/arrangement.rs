@@ -90,7 +90,9 @@ impl Arrangement {
         extent: Option<&Extent>,
     ) -> Result<(), RecordingStreamError> {
         let layout = if with_layout { self.layout.as_slice() } else { &[] };
-        layout.iter().for_each(|message| stream.record_msg(message.clone()));
+        for message in layout {
+            stream.record_msg(message.clone());
+        }
         let framed = extent.map_or(Ok(()), |extent| self.frame(stream, extent));
         self.activation.iter().for_each(|message| stream.record_msg(message.clone()));
         framed
