@@ -13,7 +13,7 @@ use crate::process;
 use crate::watch::Watch;
 
 /// Longest wait for something to show.
-const PATIENCE: Duration = Duration::from_mins(4);
+const PATIENCE: Duration = Duration::from_mins(10);
 /// Longest time without a change of the controls after which a look at the window itself is due.
 const LOOK: Duration = Duration::from_secs(1);
 /// The list of widgets is written, closed and renamed for every frame.
