@@ -18,7 +18,7 @@ const AT_REST_S: f64 = 0.3;
 /// An arm that stays where it is for so long \[s\] is at rest.
 const STILL_S: f64 = 0.4;
 
-/// Letters that are pasted at once: as many as a message has room for.
+/// Bytes that are pasted at once: as many as a message has room for.
 const PASTED: usize = 60_000;
 
 /// Longer than anything takes on a busy machine.
@@ -40,7 +40,8 @@ fn burden(mut page: Page, ends: &AtomicBool, escapes: &AtomicU64, frames: &Atomi
     tell(&mut page, &json!({"t": "screen", "width": 8000.0, "height": 8000.0, "scale": 2.0, "touch": false}));
     tell(&mut page, &json!({"t": "reads", "reads": true}));
     page.get_ref().set_read_timeout(Some(Duration::from_millis(5))).expect("set");
-    let text = "Wide letters of every kind ÄÖÜ äöü ".repeat(PASTED / 35);
+    let words = "Wide letters of every kind ÄÖÜ äöü ";
+    let text = words.repeat(PASTED / words.len());
     let open =
         |name, modifiers| json!({"t": "input", "events": [key(name, modifiers, true), key(name, modifiers, false)]});
     tell(&mut page, &open("k", 2));
