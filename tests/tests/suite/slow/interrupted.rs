@@ -151,7 +151,8 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.click(Command::SetCaptureOptions(CaptureOptions::default()));
     bench.click(Command::ContinueSequence);
-    // The arm may stand there.
+    // The arm stands at the second pose, or was stopped before it: the first move is the one to the third, or to the second.
+    bench.until("the first move that waits", |model| model.asked.is_some());
     bench.click(Command::ConfirmMove);
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());

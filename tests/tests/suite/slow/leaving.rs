@@ -73,6 +73,9 @@ fn a_sequence_ended_by(signal: &str) {
     let mut desktop = Desktop::start((1440, 900), &shots, &["--connect", &address], &[]);
     desktop.until_seen("Board in view");
     desktop.click("Run the 10 taught poses");
+    // Behind an address there may be a real arm.
+    desktop.until_seen("Move there");
+    desktop.click("Move there");
     desktop.until_seen("Use capture 2");
     witness.until_moving();
 
