@@ -83,6 +83,8 @@ pub enum Command {
     ChooseHypothesis(usize),
     /// Make a session of the recording.
     ConvertRecording,
+    /// Makes a session of the images alone, to calibrate the camera by itself.
+    ConvertImages,
     /// How the tip is jogged.
     SetJog(JogSettings),
     /// Take a capture as soon as robot and image have settled.

@@ -105,6 +105,14 @@ impl Value {
     pub fn phrase(words: &'static str) -> Self {
         if words.contains(' ') { Self::Text(Text::new(words, Vec::new())) } else { Self::Plain(words.to_owned()) }
     }
+
+    /// It by itself, in a language.
+    pub fn say(&self, language: impl Catalogue) -> String {
+        match self {
+            Self::Plain(plain) => plain.clone(),
+            Self::Text(text) => text.say(language),
+        }
+    }
 }
 
 impl From<&Text> for Value {

@@ -276,6 +276,7 @@ impl App {
             Command::FixConvention { key, value } => self.fix_convention(key, value),
             Command::ChooseHypothesis(place) => self.choose_hypothesis(place),
             Command::ConvertRecording => self.convert_recording(),
+            Command::ConvertImages => self.convert_images(),
             Command::SaveAs(folder) => self.save_as(folder),
             Command::ListFolder(folder) => self.list_folder(folder),
             Command::OpenFolder(folder) => self.open_folder(folder),

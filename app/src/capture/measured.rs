@@ -73,7 +73,7 @@ impl Measured {
         session.add_capture(&Capture {
             image: &self.rgb,
             depth_m: self.depth.as_ref(),
-            base_from_tip: self.base_from_tip,
+            base_from_tip: Some(self.base_from_tip),
             joints_rad: Some(&*self.joints_rad).filter(|joints| !joints.is_empty()),
             sim_time_s: Some(self.sim_time_s),
             role: match self.purpose {

@@ -33,7 +33,7 @@ impl CaptureRequest {
         if pose_name.is_some() {
             (options.least_distance_m, options.least_angle_rad) = (0.0, 0.0);
         }
-        let others = session.captures.iter().map(|it| (it.id.0, it.base_from_tip)).collect();
+        let others = session.captures.iter().filter_map(|it| Some((it.id.0, it.base_from_tip?))).collect();
         Self { number, purpose, options, pose_name, others }
     }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use handeye_core::project::dataset::{self, Dataset};
 use handeye_core::project::export::{self, CameraLink, ExportError, ExportInput, ExportNames, ExportView, Format};
 use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::{CaptureRecord, Session};
+use handeye_core::project::session::Session;
 
 use super::{Failure, heading, out, solve};
 
@@ -125,9 +125,7 @@ fn read_views(path: &Path) -> Result<Vec<ExportView>, Failure> {
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(path) };
     if Session::is_session(folder) {
         let session = Session::open(folder).map_err(Failure::unusable)?;
-        let view =
-            |capture: &CaptureRecord| ExportView { name: capture.image.clone(), base_from_tip: capture.base_from_tip };
-        return Ok(session.document.in_use().map(view).collect());
+        return Ok(session.document.in_use().filter_map(ExportView::of_capture).collect());
     }
     if !folder.join(dataset::DESCRIPTION).is_file() {
         return Ok(Vec::new());

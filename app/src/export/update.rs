@@ -15,7 +15,7 @@ impl App {
             .iter()
             .filter_map(|id| self.model.document().capture(*id))
             .filter(|capture| capture.is_in_use())
-            .map(|capture| ExportView { name: capture.image.clone(), base_from_tip: capture.base_from_tip })
+            .filter_map(ExportView::of_capture)
             .collect();
         let names = self.model.export.names.clone();
         Some(Box::new(ExportJob { result: solved.result.clone(), names, views }))

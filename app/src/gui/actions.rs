@@ -325,6 +325,7 @@ mod tests {
             ChooseHypothesis,
             Connect,
             ConvertRecording,
+            ConvertImages,
             DismissMessage,
             ExportKeepOut,
             ExportTaught,

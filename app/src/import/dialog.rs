@@ -65,7 +65,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     let targets = recording
         .targets
         .iter()
-        .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target.to_string()));
+        .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target.said()));
     for line in streams.chain(tracks).chain(joints).chain(cameras).chain(targets) {
         ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
     }
@@ -343,6 +343,16 @@ fn buttons_ui(ui: &mut Ui, model: &Model, import: &ImportState, language: Langua
         let button = Button::new(RichText::new(tr!(language, "Import")).strong());
         if parts::gated_ui(ui, reason, button).clicked() {
             outbox.send(Command::ConvertRecording);
+        }
+        if let Some(found) = import.found.as_deref().filter(|found| found.has_images()) {
+            let is_busy = import.work.is_some() || model.opening;
+            let reason = if found.has_target() { None } else { Some(tr!(language, "Say first what the target is")) };
+            let reason = if is_busy { Some(tr!(language, "Just a moment…")) } else { reason };
+            let button = Button::new(tr!(language, "Calibrate the camera alone"));
+            let what = tr!(language, "The intrinsics from the images, without the poses of a robot");
+            if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
+                outbox.send(Command::ConvertImages);
+            }
         }
         if ui.button(tr!(language, "Close")).clicked() {
             outbox.send(Command::SetDialog(None));

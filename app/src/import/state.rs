@@ -68,6 +68,16 @@ impl Found {
         self.judgement.as_ref().map_or(&[], |judgement| &judgement.hypotheses)
     }
 
+    /// Whether there are images that a camera can be calibrated with, also where nothing is known of a robot.
+    pub fn has_images(&self) -> bool {
+        self.recording.streams.iter().any(|stream| stream.points.is_none() && !stream.is_depth)
+    }
+
+    /// Whether it is known what they show.
+    pub fn has_target(&self) -> bool {
+        self.looked.as_ref().is_some_and(|looked| looked.target.is_some())
+    }
+
     /// The hypothesis that needs nobody to choose it.
     pub fn decided(&self) -> Option<usize> {
         let verdict = self.judgement.as_ref().map(|judgement| &judgement.verdict);

@@ -212,6 +212,14 @@ impl Look<'_> {
         let mut cameras = vec![None; recording.streams.len()];
         let wanted = self.streams();
         let has_robot = !recording.tracks.is_empty() || !recording.motions.is_empty();
+        if !has_robot && target.is_none() {
+            // The camera alone can be calibrated all the same, with what is in sight.
+            for i in wanted.iter().copied().filter(|i| recording.streams[*i].points.is_none()) {
+                let (name, paths) = (&recording.streams[i].name, recording.image_paths(i));
+                let seen = self.chessboards_in_sight(name, &paths)?;
+                self.notes.push(seen);
+            }
+        }
         if self.settings.target_poses.is_some() || wanted.is_empty() || !has_robot {
             return Ok((sights, cameras));
         }

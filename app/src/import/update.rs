@@ -85,6 +85,11 @@ impl App {
         self.ask_import(ImportWork::Writing(0, 0), ImportTask::Convert { known, hypothesis, is_taken });
     }
 
+    pub(crate) fn convert_images(&mut self) {
+        let Some(known) = self.model.import.as_deref().and_then(|import| import.found.clone()) else { return };
+        self.ask_import(ImportWork::Writing(0, 0), ImportTask::ConvertImages { known });
+    }
+
     fn import_settings(&mut self) -> Option<Settings> {
         let import = self.model.import.as_deref_mut()?;
         let mut settings = Settings::default();

@@ -10,7 +10,7 @@ use handeye_core::image::RgbImage;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::files::bounds::Bounds;
 use handeye_core::project::files::image_file;
-use handeye_core::project::import::{self, ImportError, Recording, Settings, Source, write};
+use handeye_core::project::import::{self, ImportError, Plan, Recording, Settings, Source, write};
 use handeye_core::targets::TargetSpec;
 
 use super::state::{Converted, Found, ImportWork};
@@ -65,6 +65,11 @@ pub enum ImportTask {
         /// Whether a person took it out of several.
         is_taken: bool,
     },
+    /// Make a data set of the images alone.
+    ConvertImages {
+        /// What was found.
+        known: Arc<Found>,
+    },
 }
 
 /// Does it and reports.
@@ -78,6 +83,11 @@ pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
     let event = match &job.task {
         ImportTask::Convert { known, hypothesis, is_taken } => {
             let work = || convert(known, *hypothesis, *is_taken, number, outlet);
+            let converted = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(defect(panic)));
+            Event::RecordingConverted { number, converted: converted.map(Arc::new) }
+        }
+        ImportTask::ConvertImages { known } => {
+            let work = || convert_images(known, number, outlet);
             let converted = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(defect(panic)));
             Event::RecordingConverted { number, converted: converted.map(Arc::new) }
         }
@@ -195,6 +205,16 @@ fn convert(known: &Found, hypothesis: usize, is_taken: bool, number: u64, outlet
         ));
     }
     let plan = import::plan(chosen, &looked.context(judgement, settings, chosen, is_taken), None);
+    written(plan, recording, number, outlet)
+}
+
+fn convert_images(known: &Found, number: u64, outlet: &Outlet) -> Result<Converted, Text> {
+    let target = known.looked.as_ref().and_then(|looked| looked.target.as_ref());
+    let plan = target.and_then(|target| import::plan_images(&known.recording, &known.settings, target));
+    written(plan.ok_or_else(|| text!("nothing was found"))?, &known.recording, number, outlet)
+}
+
+fn written(plan: Plan, recording: &Recording, number: u64, outlet: &Outlet) -> Result<Converted, Text> {
     let folder = tempfile::tempdir()
         .map_err(|why| text!("There is no room for the data set on the way to a session: {why}", why = why))?;
     let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Writing(done, of) });

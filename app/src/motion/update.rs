@@ -36,7 +36,11 @@ impl App {
         let of_arm = self.model.cell.as_ref().map(|cell| cell.joints.len());
         // Joints bring the arm back exactly; a recorded session may have the pose alone, or be of another arm.
         let joints = joints.filter(|joints| of_arm.is_none_or(|count| count == joints.len()));
-        let goal = joints.map_or(MotionGoal::Tip(capture.base_from_tip), MotionGoal::Joints);
+        let goal = joints.map(MotionGoal::Joints).or(capture.base_from_tip.map(MotionGoal::Tip));
+        let Some(goal) = goal else {
+            let why = text!("Capture {id} has no pose of the robot", id = id);
+            return self.say_in(Pane::Jog, Severity::Warning, why);
+        };
         self.set_out(goal, text!("pose of capture {id}", id = id));
     }
 

@@ -5,6 +5,7 @@ mod page;
 
 use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_core::estimate::handeye::Mode;
+use handeye_core::estimate::resolution::{angle_said, place_said};
 use handeye_core::project::result::{
     CalibrationResult, EstimateDetails, MethodStatus, TransformEstimate, ViewRecordStatus,
 };
@@ -13,6 +14,7 @@ pub use markdown::markdown;
 pub use page::{of_session, page, shared_camera};
 
 use crate::model::Solved;
+use crate::wording::English;
 
 /// What is said of one thing. Numbers have their units.
 #[derive(Debug, Clone, Default)]
@@ -160,7 +162,10 @@ fn fit(result: &CalibrationResult) -> Section {
         q.rms_px.map(|rms| format!("residual {rms:.4} px RMS")),
         q.heldout_rms_px.map(|rms| format!("{rms:.4} px on views held out")),
         q.sigma_px.map(|sigma| format!("corner noise {sigma:.4} px per axis")),
-        robot.map(|(mm, deg)| format!("robot noise {mm:.4} mm and {deg:.4}° per axis")),
+        robot.map(|(mm, deg)| {
+            let (place, angle) = (place_said(mm * 1e-3), angle_said(deg.to_radians()));
+            format!("robot noise {} and {} per axis", place.say(English), angle.say(English))
+        }),
     ]
     .into_iter()
     .flatten()

@@ -105,7 +105,7 @@ impl<'a> Captures<'a> {
         let median_px = if verifies { self.verified_median_px } else { self.fit_median_px };
         let rms_px = outcome.and_then(|outcome| outcome.rms_px);
         CaptureItem {
-            base_from_camera: self.known.base_from_camera(&record.base_from_tip),
+            base_from_camera: record.base_from_tip.and_then(|tip| self.known.base_from_camera(&tip)),
             standing,
             rms_px,
             times_median: rms_px.zip(median_px).map(|(rms_px, median_px)| rms_px / median_px),

@@ -90,7 +90,7 @@ pub enum PlannedItem {
 pub fn fitted_view(model: &Model) -> Option<SceneView> {
     let robot = model.robot.as_ref().filter(|robot| robot.base_from_tip.is_finite());
     let arm = robot.and_then(|robot| posed_arm(model.cell.as_ref(), &robot.base_from_tip, &robot.joints_rad));
-    let captures = model.document().captures.iter().map(|capture| &capture.base_from_tip);
+    let captures = model.document().captures.iter().filter_map(|capture| capture.base_from_tip.as_ref());
     let extent = Extent::of(&Known::of(model), arm.as_ref(), captures)?;
     Some(SceneView { centre_m: extent.centre.into(), distance_m: extent.distance_m(), ..SceneView::default() })
 }

@@ -71,7 +71,7 @@ fn views_of_base(hand_eye: &HandEye, solved: &Solved, document: &Document) -> Ve
             let used = solved.captures.iter().zip(&solved.calibration.views);
             let used = used.filter(|(_, view)| view.status == ViewStatus::Used);
             used.filter_map(|(id, _)| document.capture(*id))
-                .map(|record| (record.base_from_tip * tip_from_camera).inverse())
+                .filter_map(|record| Some((record.base_from_tip? * tip_from_camera).inverse()))
                 .collect()
         }
     }

@@ -177,7 +177,7 @@ mod tests {
             id: JobId(1),
             observations: sample::observations(),
             captures: solved.captures.clone(),
-            verification: vec![(id, View::new(record.image.clone(), record.base_from_tip, corners))],
+            verification: vec![(id, View::new(record.image.clone(), record.base_from_tip.expect("a pose"), corners))],
             recorded: Some((folder.path().to_path_buf(), document)),
             method: Method::Joint,
             options: Options::default(),

@@ -10,14 +10,12 @@ use crate::app::App;
 use crate::model::Severity;
 use crate::text;
 use crate::text::Text;
+use crate::wording::Value;
 use crate::worker::FileTask;
 
 /// Writes it; gives what there is to say.
 pub(crate) fn write(target: &TargetSpec, page: Page, file: &Path) -> (Severity, Text) {
-    let folder = file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|error| error.to_string());
-    let pdf = folder.and_then(|()| target_pdf(target, page).map_err(|error| error.to_string()));
-    let written = pdf.and_then(|pdf| atomic_file::write(file, &pdf).map_err(|error| error.to_string()));
-    match written {
+    match written(target, page, file) {
         Ok(()) => (
             Severity::Info,
             text!(
@@ -27,6 +25,13 @@ pub(crate) fn write(target: &TargetSpec, page: Page, file: &Path) -> (Severity, 
         ),
         Err(why) => (Severity::Error, text!("The board was not written: {why}", why = why)),
     }
+}
+
+fn written(target: &TargetSpec, page: Page, file: &Path) -> Result<(), Value> {
+    if let Some(folder) = file.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    Ok(atomic_file::write(file, &target_pdf(target, page)?)?)
 }
 
 /// The name of its file, which tells boards apart.

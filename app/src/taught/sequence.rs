@@ -77,7 +77,7 @@ impl App {
             return self.say_in(Pane::Verify, Severity::Warning, why);
         };
         let taken =
-            self.model.document().captures.iter().filter(|it| !it.excluded).map(|it| it.base_from_tip).collect();
+            self.model.document().captures.iter().filter(|it| !it.excluded).filter_map(|it| it.base_from_tip).collect();
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         self.model.messages.is_over_in(Pane::Verify);
         let request = ViewsRequest { board, taken, count: VERIFYING };

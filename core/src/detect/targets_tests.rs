@@ -216,7 +216,7 @@ fn another_board_is_not_accepted() {
     let tags = photo.render(1);
     // Other numbers, and the same tags in rows of another length.
     for other in [AprilGrid { first_id: 100, ..kalibr(4, 3) }, AprilGrid { ids: IdOrder::TopDown, ..kalibr(6, 6) }] {
-        assert_eq!(detect(&tags, &TargetSpec::AprilGrid(other)), Ok(None), "{other}");
+        assert_eq!(detect(&tags, &TargetSpec::AprilGrid(other)), Ok(None), "{other:?}");
     }
     assert_eq!(detect(&tags, &TargetSpec::Charuco(charuco(6, 4, None))), Ok(None));
     let photo = photo_of(TargetSpec::Charuco(charuco(6, 4, None)), camera(), 0.42, [0.3, 1.0, 0.2], Vector2::zeros());

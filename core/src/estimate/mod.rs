@@ -13,7 +13,7 @@ mod lens;
 mod pairs;
 mod refine;
 mod residuals;
-pub(crate) mod resolution;
+pub mod resolution;
 pub mod shared_lens;
 pub(crate) mod size;
 mod two_poses;

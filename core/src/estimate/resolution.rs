@@ -29,12 +29,12 @@ pub(crate) fn is_resolved(metres: f64, radians: f64) -> bool {
 }
 
 /// A length \[m\] of the robot in words: what no robot resolves is below that.
-pub(crate) fn place_said(metres: f64) -> Value {
+pub fn place_said(metres: f64) -> Value {
     said(metres, PLACE_M, &|m| format!("{} mm", shown(m * 1e3, 3)))
 }
 
 /// An angle \[rad\] likewise.
-pub(crate) fn angle_said(radians: f64) -> Value {
+pub fn angle_said(radians: f64) -> Value {
     said(radians, ANGLE_RAD, &|rad| format!("{}°", shown(rad.to_degrees(), 3)))
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn pose_variance_px2(variance_px2: f64, corners: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wording::{English, Text};
+    use crate::wording::English;
 
     #[test]
     fn the_noise_of_a_real_session_is_judged_as_it_is_and_none_as_the_least() {
@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn what_no_robot_resolves_is_said_to_be_below_that_and_not_with_its_zeros() {
-        let said = |value: Value| Text::new("{it}", vec![("it", value)]).say(English);
+        let said = |value: Value| value.say(English);
         assert_eq!([said(place_said(3.96e-4)), said(angle_said(1e-3))], ["0.396 mm", "0.057°"]);
         assert_eq!([said(place_said(0.0)), said(angle_said(1e-9))], ["below 0.010 mm", "below 0.001°"]);
     }

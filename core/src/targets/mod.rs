@@ -11,6 +11,9 @@ use std::fmt;
 use nalgebra::{Point3, Vector2};
 use serde::{Deserialize, Serialize};
 
+use crate::text;
+use crate::wording::Text;
+
 pub use dictionary::{Dictionary, UnknownDictionary};
 pub use tags::{AprilGrid, AprilTag, Charuco, IdOrder, Layout};
 
@@ -233,25 +236,25 @@ fn length(key: &'static str, value: f64) -> Result<(), BadTarget> {
     Err(BadTarget { key, value: value.to_string(), want: "a positive length in metres" })
 }
 
+impl TargetSpec {
+    /// What it is, with its sizes.
+    pub fn said(&self) -> Text {
+        let Grid { columns, rows, square_m } = self.grid();
+        let said = match self {
+            Self::Chessboard(_) => text!("chessboard of {columns}×{rows} inner corners, {mm} mm apart"),
+            Self::Circles(_) => text!("circle grid of {columns}×{rows} dots, {mm} mm apart"),
+            Self::AsymmetricCircles(_) => text!("asymmetric circle grid of {columns}×{rows} dots, rows {mm} mm apart"),
+            Self::Charuco(board) => return board.said(),
+            Self::AprilGrid(board) => return board.said(),
+            Self::AprilTag(tag) => return tag.said(),
+        };
+        said.with("columns", columns).with("rows", rows).with("mm", mm(square_m))
+    }
+}
+
 impl fmt::Display for TargetSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (kind, what) = match self {
-            Self::Chessboard(_) => ("chessboard", "inner corners"),
-            Self::Circles(_) => ("circle grid", "dots"),
-            Self::AsymmetricCircles(grid) => {
-                let (columns, rows) = (grid.columns, grid.rows);
-                return write!(
-                    f,
-                    "asymmetric circle grid of {columns}×{rows} dots, rows {} mm apart",
-                    mm(grid.square_m)
-                );
-            }
-            Self::Charuco(board) => return board.fmt(f),
-            Self::AprilGrid(board) => return board.fmt(f),
-            Self::AprilTag(tag) => return tag.fmt(f),
-        };
-        let grid = self.grid();
-        write!(f, "{kind} of {}×{} {what}, {} mm apart", grid.columns, grid.rows, mm(grid.square_m))
+        self.said().fmt(f)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Targets made of square markers.
 
-use std::fmt;
-
 use nalgebra::{Point3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use super::{BadTarget, Dictionary, Grid, count, length, mm};
+use crate::text;
+use crate::wording::Text;
 
 /// Which squares of a `ChArUco` board have the markers.
 ///
@@ -100,12 +100,19 @@ impl Charuco {
     }
 }
 
-impl fmt::Display for Charuco {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (columns, rows, square, marker) = (self.columns, self.rows, mm(self.square_m), mm(self.marker_m));
-        write!(f, "ChArUco board of {columns}×{rows} inner corners, {square} mm apart, markers {} ", self.dictionary)?;
-        write!(f, "of {marker} mm")?;
-        self.layout.map_or(Ok(()), |layout| write!(f, ", {} layout", layout.name()))
+impl Charuco {
+    pub(super) fn said(&self) -> Text {
+        let said = match self.layout {
+            None => text!(
+                "ChArUco board of {columns}×{rows} inner corners, {square} mm apart, markers {family} of {marker} mm"
+            ),
+            Some(_) => text!(
+                "ChArUco board of {columns}×{rows} inner corners, {square} mm apart, markers {family} of {marker} mm, {layout} layout"
+            ),
+        };
+        let said = said.with("columns", self.columns).with("rows", self.rows).with("square", mm(self.square_m));
+        let said = said.with("family", self.dictionary.name().to_owned()).with("marker", mm(self.marker_m));
+        said.with("layout", self.layout.map_or_else(String::new, |layout| layout.name().to_owned()))
     }
 }
 
@@ -234,11 +241,17 @@ impl AprilGrid {
     }
 }
 
-impl fmt::Display for AprilGrid {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (tag, gap) = (mm(self.tag_m), mm(self.spacing_m));
-        write!(f, "AprilGrid of {}×{} tags {} ", self.columns, self.rows, self.family)?;
-        write!(f, "of {tag} mm, {gap} mm between them, first tag {}", self.first_id)
+impl AprilGrid {
+    pub(super) fn said(&self) -> Text {
+        text!(
+            "AprilGrid of {columns}×{rows} tags {family} of {tag} mm, {gap} mm between them, first tag {first}",
+            columns = self.columns,
+            rows = self.rows,
+            family = self.family.name().to_owned(),
+            tag = mm(self.tag_m),
+            gap = mm(self.spacing_m),
+            first = self.first_id
+        )
     }
 }
 
@@ -272,9 +285,14 @@ impl AprilTag {
     }
 }
 
-impl fmt::Display for AprilTag {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "tag {} of {}, {} mm wide", self.id, self.family, mm(self.tag_m))
+impl AprilTag {
+    pub(super) fn said(&self) -> Text {
+        text!(
+            "tag {id} of {family}, {mm} mm wide",
+            id = self.id,
+            family = self.family.name().to_owned(),
+            mm = mm(self.tag_m)
+        )
     }
 }
 

@@ -346,6 +346,54 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     assert!(bench.model().import.is_none(), "nothing is left open");
 }
 
+/// A person with a camera and a board, and no robot: what the command line finds of the camera, the window finds.
+#[test]
+fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_does() {
+    let home = TempDir::new().expect("a folder");
+    let (folder, sessions) = (home.path().join("photographs"), home.path().join("sessions"));
+    std::fs::create_dir(&folder).expect("made");
+    for n in 1..=12 {
+        let name = format!("{n:02}.jpg");
+        let image = workspace_root().join("assets/samples/ur5/images").join(&name);
+        std::fs::copy(image, folder.join(name)).expect("copied");
+    }
+    let mut bench = Workbench::start(CellSource::default(), &sessions, None);
+    let import = |model: &Model| model.import.clone().filter(|import| import.work.is_none());
+    bench.click(AppCommand::Open(folder.clone()));
+    bench.until("what is there", |model| import(model).is_some_and(|import| import.trouble.is_some()));
+    let found = import(bench.model()).and_then(|import| import.found).expect("images");
+    let notes: Vec<String> =
+        found.looked.iter().flat_map(|looked| &looked.notes).map(|note| note.say(Language::English)).collect();
+    assert!(
+        notes.iter().any(|note| note.contains("10 × 7 inner corners in 12")),
+        "what is in sight is said: {notes:?}"
+    );
+    bench.click(AppCommand::SetImportTarget("10x7x15".to_owned()));
+    bench.until("the target", |model| import(model).and_then(|it| it.found).is_some_and(|it| it.has_target()));
+    bench.click(AppCommand::ConvertImages);
+    bench.until("the session", |model| model.document().captures.len() == 12 && model.dialog.is_none());
+    bench.until("a solution", |model| model.solve.fresh && model.solve.solved.is_some());
+    let session = bench.model().session.folder.clone().expect("on the disk");
+    let solved = bench.model().solve.current().expect("solved");
+    assert!(solved.calibration.hand_eye.is_none(), "there is no robot");
+    let in_window = solved.calibration.intrinsics().expect("found");
+    drop(bench);
+
+    let target = "[target]\nkind = \"chessboard\"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n";
+    std::fs::write(folder.join("dataset.toml"), target).expect("written");
+    for (input, what) in [(&folder, "the images"), (&session, "the session")] {
+        let run = command().args(["calibrate", "--quiet", "--json", "-"]).arg(input).output().expect("it runs");
+        assert!(run.status.success(), "{what}: {}", text(&run.stderr));
+        let result: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+        for (key, value) in [("fx", in_window.fx), ("fy", in_window.fy), ("cx", in_window.cx), ("cy", in_window.cy)] {
+            let off_px = result["intrinsics"][key].as_f64().expect("a number") - value;
+            // Recorded images are kept as they are, so the numbers are the same but for their order.
+            assert!(off_px.abs() < 1e-6, "{key} of {what} is {off_px} px off");
+        }
+        assert_eq!(result["hand_eye"], Value::Null, "{what}");
+    }
+}
+
 /// The images of a robot that never rests, by a camera whose clock is behind by 44 ms: every view has to get the pose that
 /// the robot had when it was taken, and the calibration what the camera really is at.
 #[test]

@@ -13,7 +13,7 @@ use crate::by_hand;
 use crate::capture::rows::{self, CaptureTable};
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
-use crate::gui::style::theme::{Palette, Tone};
+use crate::gui::style::theme::{self, Palette, Tone};
 use crate::guided::pane::{begin_ui, is_wanted, progress_ui};
 use crate::live::pane::stands_over_image;
 use crate::live::pane::waiting;
@@ -39,6 +39,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
     let language = model.view.language;
     let table = rows::table(ui.ctx(), model);
     let (button, row) = if ui.available_height() < LOW { (26.0, row::LOW_HEIGHT) } else { (32.0, row::HEIGHT) };
+    let row = theme::least(ui, 0.0, row).y;
     Frame::new().inner_margin(Margin { left: 10, right: 10, top: 8, bottom: 4 }).show(ui, |ui| {
         ui.spacing_mut().interact_size.y = ui.spacing().interact_size.y.min(button);
         ui.spacing_mut().item_spacing.y = 4.0;

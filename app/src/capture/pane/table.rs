@@ -144,7 +144,8 @@ fn refused_here(model: &Model, id: CaptureId) -> bool {
     let (true, Some(robot), Some(record)) = (too_similar, &model.robot, model.document().capture(id)) else {
         return false;
     };
-    let (distance_m, angle_rad) = robot.base_from_tip.distance_to(&record.base_from_tip);
+    let Some(taken_at) = &record.base_from_tip else { return false };
+    let (distance_m, angle_rad) = robot.base_from_tip.distance_to(taken_at);
     let options = model.view.capture;
     distance_m < options.least_distance_m && angle_rad < options.least_angle_rad
 }
@@ -159,8 +160,10 @@ fn menu_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, row: &CaptureRow, o
             ui.close();
         }
     };
-    item(ui, tr!(language, "Go there again"), Command::GoToCapture(row.id));
-    ui.separator();
+    if model.document().mode().is_some() {
+        item(ui, tr!(language, "Go there again"), Command::GoToCapture(row.id));
+        ui.separator();
+    }
     let every = |is: fn(&CaptureRow) -> bool| ids.iter().filter_map(|&id| table.row(id)).all(is);
     if every(|row| row.excluded) {
         item(ui, tr!(language, "Include"), Command::SetExcluded { ids: ids.clone(), excluded: false });

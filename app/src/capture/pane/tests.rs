@@ -53,6 +53,20 @@ fn click_row(pane: &mut PaneHarness, id: u32, modifiers: Modifiers) -> Vec<Comma
     sent
 }
 
+#[test]
+fn with_fingers_the_check_box_of_a_capture_is_in_its_row_and_as_large_as_a_finger() {
+    let mut pane = pane(sample::solved());
+    theme::for_fingers(&pane.harness.ctx, true);
+    pane.steps();
+    for id in 1..=3 {
+        let row = pane.harness.get_by_label(&row(&pane, id)).rect();
+        let check = pane.harness.get_by_label(&format!("Use capture {id}")).rect();
+        assert!(row.contains_rect(check.shrink(0.5)), "{check} is not in {row}");
+        assert!((check.center().y - row.center().y).abs() < 1.0, "{check} is not in the middle of {row}");
+        assert!(check.width() >= theme::FINGER && check.height() >= theme::FINGER, "{check}");
+    }
+}
+
 fn ids(numbers: &[u32]) -> Vec<CaptureId> {
     numbers.iter().map(|&number| CaptureId(number)).collect()
 }

@@ -19,7 +19,7 @@ const POINTER: f32 = 26.0;
 /// Between the edge of a button and its words \[points\].
 const PADDING: Vec2 = Vec2::new(10.0, 4.0);
 /// Least width and height of what is pressed with a finger \[points\].
-const FINGER: f32 = 40.0;
+pub const FINGER: f32 = 40.0;
 
 /// Colours with a meaning.
 #[derive(Debug, Clone, Copy)]

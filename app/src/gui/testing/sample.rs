@@ -89,7 +89,7 @@ fn record(n: u32) -> CaptureRecord {
         id: CaptureId(n),
         image: format!("images/{n:04}.png"),
         depth: Some(format!("depth/{n:04}.tiff")),
-        base_from_tip: base_from_tip(n),
+        base_from_tip: Some(base_from_tip(n)),
         joints_rad: Some(vec![0.1 * f64::from(n), 0.5, -1.0, 0.0, 1.5, 0.0]),
         sim_time_s: Some(f64::from(n)),
         role: if n <= FITTED { Role::Calibration } else { Role::Verification },

@@ -32,7 +32,7 @@ impl<'a> Shown<'a> {
             return Some(Self {
                 images: review.images.as_ref()?,
                 capture: Some(review.id),
-                base_from_tip: model.document().capture(review.id).map(|record| record.base_from_tip),
+                base_from_tip: model.document().capture(review.id).and_then(|record| record.base_from_tip),
                 far_plane_m,
                 depth_range_m: textures.review_range_m(),
             });

@@ -395,6 +395,6 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     assert_eq!(at(&model), Some(of_calibration), "and without tracking they are of the calibration again");
     model.review = Some(Review { id: CaptureId(3), images: Some(Arc::new(sample::images())) });
     model.track.on = true;
-    let record = model.document().capture(CaptureId(3)).expect("there").base_from_tip;
+    let record = model.document().capture(CaptureId(3)).and_then(|it| it.base_from_tip).expect("there");
     assert_eq!(at(&model), Some(calibrated.camera_from_target(&record)), "a recorded image belongs to its own time");
 }

@@ -47,7 +47,7 @@ fn not_compressed(path: &str, (width, height): (u32, u32), error: &dyn std::erro
 pub(super) fn write_depth(
     pen: Pen<'_>,
     known: &Known,
-    base_from_tip: &Pose<Base, Tip>,
+    base_from_tip: Option<&Pose<Base, Tip>>,
     (depth, rgb): (&DepthImage, &RgbImage),
     far_plane_m: Option<f32>,
 ) -> Result<(), RecordError> {
@@ -56,7 +56,8 @@ pub(super) fn write_depth(
         far_plane_m.unwrap_or_else(|| depth.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max));
     let path = below(&lens(known), paths::DEPTH);
     pen.write(&path, &compressed_depth(&path, depth, far_m)?)?;
-    let (Some(base_from_camera), Some(intrinsics)) = (known.base_from_camera(base_from_tip), known.intrinsics()) else {
+    let base_from_camera = base_from_tip.and_then(|tip| known.base_from_camera(tip));
+    let (Some(base_from_camera), Some(intrinsics)) = (base_from_camera, known.intrinsics()) else {
         return Ok(());
     };
     let (points, colours) = points_in_base(depth, rgb, far_m, &intrinsics, &base_from_camera);

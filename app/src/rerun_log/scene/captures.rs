@@ -60,7 +60,7 @@ impl Captures {
 
     /// Where the tip was at each.
     pub fn tips(&self) -> impl Iterator<Item = &Pose<Base, Tip>> {
-        self.shown.values().map(|shown| &shown.record.base_from_tip)
+        self.shown.values().filter_map(|shown| shown.record.base_from_tip.as_ref())
     }
 
     /// Takes over a document. Every capture that was not there before counts one more.

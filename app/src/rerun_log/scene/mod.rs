@@ -286,7 +286,13 @@ impl SceneWriter {
             self.depth_at_s = Some(self.clock.sim_time_s);
             if let Some(depth) = &images.depth {
                 let images = (&depth.metres, &images.rgb);
-                faults.tolerate(camera::write_depth(pen, &self.known, base_from_tip, images, self.far_plane_m))?;
+                faults.tolerate(camera::write_depth(
+                    pen,
+                    &self.known,
+                    Some(base_from_tip),
+                    images,
+                    self.far_plane_m,
+                ))?;
             }
         }
         faults.finish()
@@ -345,12 +351,14 @@ impl SceneWriter {
         let as_taken = Instant { sim_time_s: taken.sim_time_s.filter(|_| !is_live), ..taken };
         pen.at(as_taken);
         let live_tip = self.known.base_from_tip;
-        self.tip(pen, &record.base_from_tip, record.joints_rad.as_deref())?;
+        if let Some(taken_at) = &record.base_from_tip {
+            self.tip(pen, taken_at, record.joints_rad.as_deref())?;
+        }
         self.joints(pen, record.joints_rad.as_deref().unwrap_or_default())?;
         if is_live {
             self.known.base_from_tip = live_tip;
-        } else {
-            self.trails(pen, &record.base_from_tip)?;
+        } else if let Some(taken_at) = &record.base_from_tip {
+            self.trails(pen, taken_at)?;
         }
         let image = self.captures.image(&record);
         if let Ok(Some(image)) = &image {
@@ -358,7 +366,7 @@ impl SceneWriter {
         }
         match self.captures.depth(&record) {
             Ok(Some((depth, rgb))) => {
-                let (tip, images) = (&record.base_from_tip, (&depth, &rgb));
+                let (tip, images) = (record.base_from_tip.as_ref(), (&depth, &rgb));
                 faults.tolerate(camera::write_depth(pen, &self.known, tip, images, self.far_plane_m))?;
             }
             Ok(None) => {}

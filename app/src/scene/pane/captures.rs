@@ -1,7 +1,8 @@
 //! The captures in three dimensions: from where each was taken, in the colour of its residual.
 
 use egui::{Color32, Pos2, Stroke};
-use handeye_core::project::session::{CaptureId, CaptureRecord};
+use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_core::project::session::CaptureId;
 use nalgebra::Point3;
 
 use super::board::{self, Line};
@@ -51,7 +52,9 @@ pub fn captures(
 ) -> Vec<Spot> {
     let items = Captures::new(known);
     let mut spots = Vec::new();
-    for record in model.document().captures.iter().filter(|record| record.base_from_tip.is_finite()) {
+    // Without a robot nothing says where the camera was.
+    let taken = model.document().captures.iter().filter_map(|record| Some((record, record.base_from_tip?)));
+    for (record, base_from_tip) in taken.filter(|(_, base_from_tip)| base_from_tip.is_finite()) {
         let item = items.item(record);
         let plain = colour(&item, model.outlier_line_px, marks, palette.warning);
         let is_selected = model.selection.contains(&record.id);
@@ -61,7 +64,7 @@ pub fn captures(
             (.., Standing::Excluded) => (1.0, plain.gamma_multiply(0.7), 0.05),
             _ => (1.2, plain, 0.12),
         };
-        let place = capture(canvas, known, record, &item, (width, colour, colour.gamma_multiply(strength)));
+        let place = capture(canvas, known, &base_from_tip, &item, (width, colour, colour.gamma_multiply(strength)));
         if let Some(seen) = canvas.eye.point(&place.point_at) {
             spots.push(Spot { id: record.id, at: seen.at, taken_m: place.taken_m });
         }
@@ -78,13 +81,13 @@ struct Place {
 fn capture(
     canvas: &mut Canvas,
     known: &Known,
-    record: &CaptureRecord,
+    base_from_tip: &Pose<Base, Tip>,
     item: &CaptureItem,
     (width, edge, fill): (f32, Color32, Color32),
 ) -> Place {
-    let tip_m = Point3::from(record.base_from_tip.translation());
+    let tip_m = Point3::from(base_from_tip.translation());
     if let Some(BoardItem { place: Fixed::Tip(tip_from_target), shape: Some(target), .. }) = known.board() {
-        let base_from_target = record.base_from_tip * tip_from_target;
+        let base_from_target = *base_from_tip * tip_from_target;
         board::outlined(canvas, &base_from_target, &target, (width, edge), Line::Solid);
         let middle = base_from_target.isometry() * target.centre();
         return Place { point_at: middle, taken_m: tip_m };
@@ -95,8 +98,7 @@ fn capture(
         Place { point_at: frustum.middle(), taken_m: Point3::from(base_from_camera.translation()) }
     } else {
         canvas.dot(&tip_m, 3.0 + width, edge);
-        canvas
-            .line([tip_m, record.base_from_tip.isometry() * Point3::new(0.0, 0.0, LENGTH_M)], Stroke::new(width, edge));
+        canvas.line([tip_m, base_from_tip.isometry() * Point3::new(0.0, 0.0, LENGTH_M)], Stroke::new(width, edge));
         Place { point_at: tip_m, taken_m: tip_m }
     }
 }

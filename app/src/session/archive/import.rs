@@ -101,13 +101,6 @@ impl Archive {
         let mut captures = Vec::with_capacity(dataset.entries.len());
         for (index, entry) in dataset.entries.iter().enumerate() {
             let (row, name) = (index + 1, &entry.name);
-            let Some(base_from_tip) = entry.base_from_tip else {
-                return Err(text!(
-                    "row {row} ({name}) has no robot pose: solve this data set with “handeye calibrate” instead",
-                    row = row,
-                    name = name
-                ));
-            };
             if entry.image_path.is_none() {
                 return Err(text!(
                     "row {row} ({name}) has no image: solve this data set with “handeye calibrate” instead",
@@ -115,15 +108,15 @@ impl Archive {
                     name = name
                 ));
             }
-            captures.push((entry, base_from_tip));
+            captures.push(entry);
         }
         let mut store = Store::create_with(&target_folder, Document::new(meta))?;
-        for (entry, base_from_tip) in captures {
+        for entry in captures {
             let image = dataset.load_rgb(entry)?;
             let added = store.add_capture(&Capture {
                 image: &image,
                 depth_m: None,
-                base_from_tip,
+                base_from_tip: entry.base_from_tip,
                 joints_rad: entry.joints_rad.as_deref(),
                 sim_time_s: None,
                 role: Role::Calibration,

@@ -206,7 +206,7 @@ fn a_camera_beside_the_robot_is_shown_in_the_base() {
 fn observations(model: &Model) -> Observations {
     let views = model.document().in_use().map(|record| {
         let corners = model.observed(record.id).and_then(|observed| observed.corners.clone());
-        ObservedView::new(&record.image, Some(record.base_from_tip), corners)
+        ObservedView::new(&record.image, record.base_from_tip, corners)
     });
     Observations {
         mode: Some(Mode::EyeInHand),

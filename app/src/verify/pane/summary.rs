@@ -6,7 +6,11 @@ use handeye_core::verify::Verification;
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
 use crate::model::Model;
+use crate::wording::Value;
 use crate::{text, tr};
+
+/// A ratio below that would be shown as zero.
+const LEAST_RATIO: f64 = 0.01;
 
 /// Errors of prediction, and whether they are as large as stated.
 pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
@@ -29,7 +33,11 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
     let (colour, verdict) = match &verification.consistency {
         None => (palette.weak, text!("The calibration states no uncertainty to compare these errors with")),
         Some(consistency) => {
-            let ratio = format!("{:.2}", consistency.ratio);
+            let ratio: Value = if consistency.ratio < LEAST_RATIO {
+                text!("below {high}", high = format!("{LEAST_RATIO:.2}")).into()
+            } else {
+                format!("{:.2}", consistency.ratio).into()
+            };
             let limit = format!("{:.2}", consistency.limit);
             if consistency.is_consistent() {
                 let text = text!(

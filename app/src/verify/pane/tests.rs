@@ -66,6 +66,17 @@ fn errors_that_are_too_large_are_said_to_be() {
     assert!(pane.nothing_is_cut_off());
 }
 
+/// As on an exact cell, whose errors are what rounding leaves.
+#[test]
+fn errors_next_to_nothing_are_not_said_with_zeros() {
+    let pane = driven(sample::with_answer(|solved| {
+        if let Some(Ok(verification)) = &mut solved.verification {
+            verification.consistency.as_mut().expect("stated").ratio = 1e-5;
+        }
+    }));
+    assert!(pane.sees("their mean square is below 0.01 times the expected one"));
+}
+
 #[test]
 fn a_verification_without_an_answer_says_why() {
     let pane = driven(sample::with_answer(|solved| {

@@ -19,6 +19,7 @@ use crate::targets::TargetSpec;
 #[serde(deny_unknown_fields)]
 struct RawConfig {
     mode: Option<Mode>,
+    images: Option<Vec<String>>,
     target: RawTarget,
     robot: Option<Spanned<RawRobot>>,
     camera: Option<Spanned<RawCamera>>,
@@ -123,6 +124,8 @@ impl ModelName {
 #[derive(Debug, Clone)]
 pub(super) struct Config {
     pub mode: Option<Mode>,
+    /// Without a robot, the images that count; `None`: all of the folder.
+    pub images: Option<Vec<String>>,
     pub target: TargetSpec,
     pub corners: Option<String>,
     pub target_poses: Option<String>,
@@ -180,6 +183,7 @@ impl Config {
         }
         let config = Self {
             mode: raw.mode,
+            images: raw.images,
             target,
             corners: raw.target.corners,
             target_poses: raw.target.poses,
@@ -200,6 +204,11 @@ impl Config {
         if self.robot.is_some() && self.mode.is_none() {
             return Err(DatasetProblem::Conflict(
                 "mode is missing: write mode = \"eye_in_hand\" or \"eye_to_hand\" above [target]",
+            ));
+        }
+        if self.robot.is_some() && self.images.is_some() {
+            return Err(DatasetProblem::Conflict(
+                "images names those of a camera without a robot: with [robot] its pose table names them",
             ));
         }
         if self.robot.is_none() && self.target_poses.is_some() {

@@ -127,7 +127,7 @@ impl Dataset {
         let corners_file = table(&config.corners)?;
         let target_poses_file = table(&config.target_poses)?;
 
-        let views = views(folder, &config, poses_file.as_ref())?;
+        let views = views(folder, &config, poses_file.as_ref(), &description.path)?;
         let mut corners = corners_file.as_ref().map(|file| corners::read_corners(file, &config.target)).transpose()?;
         let mut entries = EntryList { folder, poses_file: poses_file.as_ref(), views };
         if let (Some(file), Some(corners)) = (&corners_file, &corners) {
@@ -333,7 +333,12 @@ fn read_table(
     TextFile::read(folder, &path)
 }
 
-fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Result<Vec<View>, DatasetError> {
+fn views(
+    folder: &Path,
+    config: &Config,
+    poses_file: Option<&TextFile>,
+    description: &Path,
+) -> Result<Vec<View>, DatasetError> {
     if let (Some(file), Some(robot)) = (poses_file, &config.robot) {
         let rows = poses::read_poses(file, robot, robot.joints.as_ref())?;
         let view = |PoseRow { name, path, line, isometry, joints_rad }| View {
@@ -345,6 +350,9 @@ fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Resul
         };
         return Ok(rows.into_iter().map(view).collect());
     }
+    if let Some(names) = &config.images {
+        return named_images(names).map_err(|problem| DatasetError::new(description, None, problem));
+    }
     let paths = images::list(folder)?;
     if paths.is_empty() && config.corners.is_none() {
         // Without [robot] a table in the folder is not read, and says nothing of where the images are.
@@ -353,6 +361,22 @@ fn views(folder: &Path, config: &Config, poses_file: Option<&TextFile>) -> Resul
         return Err(DatasetError::new(folder, None, DatasetProblem::NoImages(hint)));
     }
     Ok(paths.into_iter().map(|path| View::of_image(path.to_string_lossy().into_owned(), path)).collect())
+}
+
+fn named_images(names: &[String]) -> Result<Vec<View>, DatasetProblem> {
+    let mut views: Vec<View> = Vec::with_capacity(names.len());
+    for name in names {
+        let bad = |want| DatasetProblem::BadValue { key: "images", value: format!("{:?}", error::shown(name)), want };
+        let path = text::resolve(Path::new(""), name).ok_or_else(|| bad("paths in this folder"))?;
+        if views.iter().any(|view| view.path == path) {
+            return Err(bad("every image once"));
+        }
+        views.push(View::of_image(name.clone(), path));
+    }
+    if views.is_empty() {
+        return Err(DatasetProblem::BadValue { key: "images", value: "[]".to_owned(), want: "at least one image" });
+    }
+    Ok(views)
 }
 
 fn camera_from_target(pose: Isometry3<f64>, direction: TargetPoseDirection) -> Pose<Camera, Target> {

@@ -134,6 +134,24 @@ fn without_a_robot_all_images_are_views_in_natural_order() {
 }
 
 #[test]
+fn without_a_robot_the_images_that_count_can_be_named() {
+    let images = ["a.png", "b.png", "images/c.png"];
+    let description = |named: &str| format!("images = {named}\n{TARGET}");
+    let folder = Folder::new(&description("['images/c.png', 'a.png']"), "", &images);
+    let names: Vec<String> = folder.read().entries.into_iter().map(|entry| entry.name).collect();
+    assert_eq!(names, ["images/c.png", "a.png"]);
+    for (named, why) in [
+        ("['a.png', './a.png']", "every image once"),
+        ("['a.png', '/b.png']", "paths in this folder"),
+        ("[]", "at least one image"),
+        ("['d.png']", "d.png"),
+    ] {
+        let error = Folder::new(&description(named), "", &images).error();
+        assert!(error.contains(why), "{named}: {error}");
+    }
+}
+
+#[test]
 fn corners_stand_in_for_absent_images() {
     let camera = "[camera]\nfixed = false\nwidth = 640\nheight = 480\n";
     let target = format!("{TARGET}corners = \"corners.csv\"\n");

@@ -57,6 +57,17 @@ pub fn description(
     text
 }
 
+/// The text of `dataset.toml` for images without a robot: these and no others.
+pub fn description_of_images<'a>(
+    images: impl IntoIterator<Item = &'a str>,
+    target: &TargetSpec,
+    camera: Option<&CameraInput>,
+) -> String {
+    let images: Vec<&str> = images.into_iter().collect();
+    let camera = camera.map(camera_table).unwrap_or_default();
+    format!("images = {}\n\n{}{camera}", toml::Value::from(images), target_table(target))
+}
+
 /// The rest of `[robot]`, and `[robot.arm]`.
 fn arm_table(arm: &ArmModel) -> String {
     let (joints, what) = match arm {

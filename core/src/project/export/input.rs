@@ -7,6 +7,7 @@ use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Mount, Pose, Tip};
 use crate::project::result::{CalibrationResult, IntrinsicsEstimate};
+use crate::project::session::CaptureRecord;
 
 /// What is exported.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +27,13 @@ pub struct ExportView {
     pub name: String,
     /// Tip pose as the controller reported it.
     pub base_from_tip: Pose<Base, Tip>,
+}
+
+impl ExportView {
+    /// Of a capture of a session; `None` where there is no robot.
+    pub fn of_capture(capture: &CaptureRecord) -> Option<Self> {
+        Some(Self { name: capture.image.clone(), base_from_tip: capture.base_from_tip? })
+    }
 }
 
 impl<'a> ExportInput<'a> {

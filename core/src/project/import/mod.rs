@@ -56,4 +56,4 @@ pub use recording::{
 pub use settings::{KEYS, Settings};
 pub use sight::{Sight, size_of_points};
 pub use timing::timed;
-pub use write::{Plan, plan};
+pub use write::{Plan, plan, plan_images};

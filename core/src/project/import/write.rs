@@ -10,12 +10,14 @@ use super::error::ImportError;
 use super::folder::unreadable;
 use super::hypothesis::{Hypothesis, Source};
 use super::judge::{Judgement, TIMES};
-use super::recording::{FoundCamera, Recording, Track};
+use super::recording::{FoundCamera, ImageFile, Recording, Track};
 use super::settings::Settings;
 use super::sight::{recorded_corners, size_of_points};
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::dataset::CameraInput;
-use crate::project::dataset::write::{Joints, description, pose_table, pose_table_with_joints};
+use crate::project::dataset::write::{
+    Joints, POSE_TABLE, description, description_of_images, pose_table, pose_table_with_joints,
+};
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
 use crate::project::files::own_folder::{self, DESCRIPTION};
@@ -34,8 +36,8 @@ const IMAGES: &str = "images";
 pub struct Plan {
     /// The text of `dataset.toml`.
     pub description: String,
-    /// The text of `poses.csv`.
-    pub poses: String,
+    /// The text of `poses.csv`, where there is a robot.
+    pub poses: Option<String>,
     /// The text of `target_poses.csv`, where there are no images.
     pub target_poses: Option<String>,
     /// The text of `corners.csv`, where recorded corners stand for images.
@@ -179,7 +181,42 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
     } else {
         text.push_str(&body);
     }
-    Plan { description: text, poses, target_poses, corners: corner_rows, images, views: rows.len(), left_out }
+    Plan {
+        description: text,
+        poses: Some(poses),
+        target_poses,
+        corners: corner_rows,
+        images,
+        views: rows.len(),
+        left_out,
+    }
+}
+
+/// Plans the folder of images alone, to calibrate the camera by itself: those that a person named, or else those of the stream
+/// that has most. `None` where there are no images; depth images are none.
+pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetSpec, String)) -> Option<Plan> {
+    let streams = recording.streams.iter().filter(|stream| stream.points.is_none() && !stream.is_depth);
+    let stream = match &settings.images {
+        Some(name) => streams.into_iter().find(|stream| stream.name == *name),
+        None => streams.rev().max_by_key(|stream| stream.images.len()),
+    }?;
+    let mut names = Names { link_to: None, root: &recording.root, taken: BTreeSet::new() };
+    let named = |(index, image): (usize, &ImageFile)| (recording.root.join(&image.path), names.of(&image.path, index));
+    let images: Vec<_> = stream.images.iter().enumerate().map(named).collect();
+    let (target, why) = target;
+    let mut text = String::new();
+    comment(&mut text, &format!("Images alone, without a robot: {}. The target is {why}.", stream.name));
+    text.push_str(&description_of_images(images.iter().map(|(_, name)| name.as_str()), target, None));
+    let views = images.len();
+    Some(Plan {
+        description: text,
+        poses: None,
+        target_poses: None,
+        corners: None,
+        images,
+        views,
+        left_out: Vec::new(),
+    })
 }
 
 /// Corners that stand for images, and the size of those.
@@ -415,7 +452,9 @@ pub fn write(plan: &Plan, out: &Path, mut progress: impl FnMut(usize, usize)) ->
             progress(i + 1, plan.images.len());
         }
     }
-    put(crate::project::dataset::write::POSE_TABLE, plan.poses.as_bytes())?;
+    if let Some(poses) = &plan.poses {
+        put(POSE_TABLE, poses.as_bytes())?;
+    }
     if let Some(target_poses) = &plan.target_poses {
         put(TARGET_POSES, target_poses.as_bytes())?;
     }

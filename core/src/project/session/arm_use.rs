@@ -34,11 +34,16 @@ impl Document {
     pub(super) fn as_dataset(&self) -> (String, String) {
         let meta = &self.meta;
         let describe = |joints| dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), joints);
+        if self.mode().is_none() {
+            let images = self.in_use().map(|capture| capture.image.as_str());
+            let description = dataset::write::description_of_images(images, &meta.target, meta.camera.as_ref());
+            return (description, dataset::write::pose_table(std::iter::empty()));
+        }
         if let Some((joints, table)) = self.joints().and_then(|joints| Some((joints, self.table_with_joints(joints)?)))
         {
             return (describe(Some(joints)), table);
         }
-        let views = self.in_use().map(|capture| (capture.image.as_str(), &capture.base_from_tip));
+        let views = self.in_use().filter_map(|capture| Some((capture.image.as_str(), capture.base_from_tip.as_ref()?)));
         (describe(None), dataset::write::pose_table(views))
     }
 
@@ -53,7 +58,7 @@ impl Document {
             .in_use()
             .map(|capture| {
                 let joints_rad = capture.joints_rad.as_deref().filter(|values| values.len() == joints)?;
-                Some((capture.image.as_str(), &capture.base_from_tip, joints_rad))
+                Some((capture.image.as_str(), capture.base_from_tip.as_ref()?, joints_rad))
             })
             .collect::<Option<Vec<_>>>()?;
         Some(dataset::write::pose_table_with_joints(joints, rows))
@@ -61,7 +66,7 @@ impl Document {
 }
 
 fn joint_view(capture: &CaptureRecord) -> Option<JointView<'_>> {
-    Some(JointView { base_from_tip: capture.base_from_tip, joints_rad: capture.joints_rad.as_deref()? })
+    Some(JointView { base_from_tip: capture.base_from_tip?, joints_rad: capture.joints_rad.as_deref()? })
 }
 
 #[cfg(test)]

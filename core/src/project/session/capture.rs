@@ -26,8 +26,8 @@ pub struct Capture<'a> {
     pub image: &'a RgbImage,
     /// Depth in metres, of the size of the image.
     pub depth_m: Option<&'a DepthImage>,
-    /// Tip pose as the controller reported it.
-    pub base_from_tip: Pose<Base, Tip>,
+    /// Tip pose as the controller reported it; `None` where there is no robot.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Joint angles as the controller reported them, radians.
     pub joints_rad: Option<&'a [f64]>,
     /// Simulation time of the image, seconds.
@@ -46,11 +46,11 @@ pub struct Capture<'a> {
 
 impl<'a> Capture<'a> {
     /// A single frame for calibration, with nothing else known.
-    pub fn new(image: &'a RgbImage, base_from_tip: Pose<Base, Tip>) -> Self {
+    pub fn new(image: &'a RgbImage, base_from_tip: impl Into<Option<Pose<Base, Tip>>>) -> Self {
         Self {
             image,
             depth_m: None,
-            base_from_tip,
+            base_from_tip: base_from_tip.into(),
             joints_rad: None,
             sim_time_s: None,
             role: Role::Calibration,

@@ -109,9 +109,9 @@ pub struct CaptureRecord {
     pub image: String,
     /// The depth image, relative to the session.
     pub depth: Option<String>,
-    /// Tip pose as the controller reported it.
-    #[serde(with = "pose_record")]
-    pub base_from_tip: Pose<Base, Tip>,
+    /// Tip pose as the controller reported it; `None` where there is no robot. All captures of a session have one, or none has.
+    #[serde(default, with = "pose_record::optional", skip_serializing_if = "Option::is_none")]
+    pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Joint angles as the controller reported them, radians.
     pub joints_rad: Option<Vec<f64>>,
     /// Simulation time of the image, seconds.
@@ -141,13 +141,13 @@ fn one() -> u32 {
 }
 
 impl CaptureRecord {
-    /// A capture of which no more is known than its image and where the tip was.
-    pub fn new(id: CaptureId, image: String, base_from_tip: Pose<Base, Tip>) -> Self {
+    /// A capture of which no more is known than its image and, where there is a robot, where the tip was.
+    pub fn new(id: CaptureId, image: String, base_from_tip: impl Into<Option<Pose<Base, Tip>>>) -> Self {
         Self {
             id,
             image,
             depth: None,
-            base_from_tip,
+            base_from_tip: base_from_tip.into(),
             joints_rad: None,
             sim_time_s: None,
             role: Role::Calibration,
@@ -176,6 +176,23 @@ impl Document {
         self.captures.iter().filter(|capture| capture.is_in_use())
     }
 
+    /// Where the camera sits; `None` where there is no robot, and the camera by itself is calibrated.
+    pub fn mode(&self) -> Option<Mode> {
+        let has_robot = self.captures.first().is_none_or(|capture| capture.base_from_tip.is_some());
+        has_robot.then_some(self.meta.mode)
+    }
+
+    /// Refuses a capture with a pose of the robot among others without one, and the reverse.
+    pub(super) fn check_robot(&self, capture: &CaptureRecord) -> Result<(), EditError> {
+        let at = || format!("capture {} ({})", capture.id, capture.image);
+        match (self.mode(), capture.base_from_tip) {
+            _ if self.captures.is_empty() => Ok(()),
+            (Some(_), None) => Err(bad(at(), "has no pose of the robot, and the others have one: begin a new session")),
+            (None, Some(_)) => Err(bad(at(), "has a pose of the robot, and the others have none: begin a new session")),
+            (Some(_), Some(_)) | (None, None) => Ok(()),
+        }
+    }
+
     /// Checks everything that the types do not say.
     ///
     /// # Errors
@@ -190,6 +207,7 @@ impl Document {
             if self.captures[..i].iter().any(|other| other.image == capture.image) {
                 return Err(bad(format!("the image {:?}", capture.image), "is there twice"));
             }
+            self.check_robot(capture)?;
         }
         check_taught(&self.taught)
     }
@@ -235,7 +253,7 @@ impl CaptureRecord {
         if !self.files().all(stays_inside) {
             return refuse("names a file that is not inside of the session");
         }
-        if !self.base_from_tip.is_finite() {
+        if !self.base_from_tip.is_none_or(|pose| pose.is_finite()) {
             return refuse("has a tip pose that is not finite");
         }
         let measured = [self.corner_noise_px, self.settled_s];

@@ -66,6 +66,7 @@ impl Document {
                 if self.capture(record.id).is_some() || self.captures.iter().any(|c| c.image == record.image) {
                     return Err(EditError::UsedNumber(record.id));
                 }
+                self.check_robot(record)?;
                 next.captures.push((**record).clone());
             }
             Edit::DeleteCaptures(ids) => {

@@ -3,7 +3,7 @@ use serde_json::json;
 use super::*;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::Pose;
-use crate::project::session::tests::{meta, record};
+use crate::project::session::tests::{meta, pose, record};
 use crate::project::taught_poses::{Goal, TaughtOn};
 use crate::targets::Grid;
 
@@ -143,7 +143,7 @@ fn an_edit_that_does_not_fit_is_refused_with_the_reason() {
         CaptureRecord { id: CaptureId(0), ..record(3) },
         CaptureRecord { image: "../0003.png".into(), ..record(3) },
         CaptureRecord { depth: Some("/etc/passwd".into()), ..record(3) },
-        CaptureRecord { base_from_tip: nan, ..record(3) },
+        CaptureRecord { base_from_tip: Some(nan), ..record(3) },
         CaptureRecord { joints_rad: Some(vec![f64::INFINITY]), ..record(3) },
         CaptureRecord { sim_time_s: Some(f64::NAN), ..record(3) },
         CaptureRecord { frames: 0, ..record(3) },
@@ -211,7 +211,7 @@ fn edits_read_back_as_they_were_written() {
         Edit::SetCamera(meta().camera),
         Edit::SetTaught {
             change: TaughtChange::Rename { from: "a\n".into(), to: "b".into() },
-            poses: vec![TaughtPose::new("b", Goal::Tip(record(1).base_from_tip))],
+            poses: vec![TaughtPose::new("b", Goal::Tip(pose(1)))],
         },
         Edit::SetExportNames(json!({"a": [1, 0.1, null]})),
     ];

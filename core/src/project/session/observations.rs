@@ -37,7 +37,7 @@ impl Document {
         let mut tip_by_joint = self.tip_by_joint_or_none();
         let mut seen = SessionObservations {
             observations: Observations {
-                mode: Some(self.meta.mode),
+                mode: self.mode(),
                 target: self.meta.target,
                 image_size,
                 camera: CameraInput::knowledge(self.meta.camera.as_ref()),
@@ -55,11 +55,13 @@ impl Document {
                     seen.observations.views.push(ObservedView {
                         tip_by_joint,
                         in_fit: capture.is_in_use(),
-                        ..ObservedView::new(&capture.image, Some(capture.base_from_tip), corners)
+                        ..ObservedView::new(&capture.image, capture.base_from_tip, corners)
                     });
                 }
                 (Role::Verification, Some(corners)) if !capture.excluded => {
-                    let view = View::new(capture.image.clone(), capture.base_from_tip, corners);
+                    // A camera by itself is not verified.
+                    let Some(base_from_tip) = capture.base_from_tip else { continue };
+                    let view = View::new(capture.image.clone(), base_from_tip, corners);
                     seen.verification.push((capture.id, View { tip_by_joint, ..view }));
                 }
                 (Role::Verification, _) => {}

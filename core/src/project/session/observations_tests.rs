@@ -35,7 +35,7 @@ fn exclusions_and_verification_captures_are_known_by_their_number_wherever_they_
     );
     for (id, view) in seen.captures.iter().zip(&seen.observations.views) {
         assert_eq!(view.corners, Some(corner_of(*id).into()), "{} has the corners of another capture", view.name);
-        assert_eq!(view.base_from_tip, Some(record(id.0).base_from_tip));
+        assert_eq!(view.base_from_tip, record(id.0).base_from_tip);
     }
     // Excluded, or without the target, it verifies nothing.
     let verification: Vec<_> = seen.verification.iter().map(|(id, view)| (id.0, view.name.as_str())).collect();

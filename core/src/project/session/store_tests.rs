@@ -104,7 +104,7 @@ fn a_change_that_does_not_fit_leaves_every_file_as_it_was() {
     let (other_size, nothing) = (RgbImage::new(25, 16), RgbImage::new(0, 0));
     let capture = Capture::new(&good, pose(0));
     let wrong = [
-        Capture { base_from_tip: nan, ..capture },
+        Capture { base_from_tip: Some(nan), ..capture },
         Capture { depth_m: Some(&small), ..capture },
         Capture { joints_rad: Some(&[f64::INFINITY]), ..capture },
         Capture { sim_time_s: Some(f64::NAN), ..capture },

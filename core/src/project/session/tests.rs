@@ -38,7 +38,7 @@ pub(super) fn record(id: u32) -> CaptureRecord {
         id: CaptureId(id),
         image: format!("images/{id:04}.png"),
         depth: id.is_multiple_of(2).then(|| format!("depth/{id:04}.tiff")),
-        base_from_tip: pose(id as u8),
+        base_from_tip: Some(pose(id as u8)),
         joints_rad: Some(vec![0.1, f64::from(id) / 3.0]),
         sim_time_s: None,
         role: Role::Calibration,
@@ -126,11 +126,39 @@ fn a_session_reads_back_bit_for_bit_and_is_a_dataset() {
         let read = entry.base_from_tip.expect("a pose");
         assert_eq!(entry.name, record.image);
         assert_eq!((read.translation(), rotation(&read)), (pose(i as u8).translation(), rotation(&pose(i as u8))));
-        assert_eq!(rotation(&record.base_from_tip), rotation(&pose(i as u8)));
+        assert_eq!(rotation(&record.base_from_tip.expect("a pose")), rotation(&pose(i as u8)));
         assert_eq!(data.load_rgb(entry).expect("image"), image(i as u8));
     }
     let files = [".lock", "dataset.toml", "depth", "images", "journal.jsonl", "poses.csv", "session.json"];
     assert_eq!(names(&dir), files);
+}
+
+/// Of images alone there is a camera to calibrate, in the window and for other programs.
+#[test]
+fn images_alone_are_a_session_without_a_robot_and_their_data_set_has_those_in_use() {
+    let dir = folder();
+    let mut store = Store::create(dir.path(), meta()).expect("create");
+    for i in 1..=4 {
+        store.add_capture(&Capture::new(&image(i), None)).expect("add");
+    }
+    let excluded = Edit::SetExcluded { ids: vec![CaptureId(2)], excluded: true };
+    store.apply(excluded).expect("exclude");
+    let error = store.add_capture(&Capture::new(&image(9), pose(1))).expect_err("of a robot");
+    assert!(error.to_string().contains("the others have none: begin a new session"), "{error}");
+
+    let document = Session::open(dir.path()).expect("open").document;
+    assert_eq!((&*document, document.mode()), (&**store.document(), None));
+    let seen = document.observations((24, 16), |_| Some(Vec::new()));
+    assert_eq!((seen.observations.mode, seen.observations.views.len()), (None, 4));
+    let data = Dataset::read(dir.path()).unwrap_or_else(|e| panic!("{e}"));
+    let names: Vec<&str> = data.entries.iter().map(|entry| entry.name.as_str()).collect();
+    assert_eq!((data.mode, data.camera), (None, meta().camera));
+    assert_eq!(names, ["images/0001.png", "images/0003.png", "images/0004.png"]);
+
+    let other = folder();
+    let mut with_robot = store_with(other.path(), 1);
+    let error = with_robot.add_capture(&Capture::new(&image(2), None)).expect_err("of no robot");
+    assert!(error.to_string().contains("the others have one: begin a new session"), "{error}");
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
 }
 
 fn poses(model: &Model, role: Role) -> Vec<Pose<Base, Tip>> {
-    model.document().captures.iter().filter(|it| it.role == role).map(|it| it.base_from_tip).collect()
+    model.document().captures.iter().filter(|it| it.role == role).filter_map(|it| it.base_from_tip).collect()
 }
 
 #[test]
