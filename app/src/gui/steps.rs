@@ -47,6 +47,8 @@ pub struct Facts {
     pub board_in_view: bool,
     /// It was found in a capture.
     pub board_captured: bool,
+    /// The captures are images alone, to calibrate the camera by itself.
+    pub no_robot: bool,
     /// Captures that enter the fit.
     pub captures_in_use: usize,
     /// The solver is at work.
@@ -88,6 +90,7 @@ impl Facts {
             frame_seen: model.frame.is_some(),
             board_in_view: connected && seen_now,
             board_captured: captured,
+            no_robot: document.mode().is_none(),
             captures_in_use: document.in_use().count(),
             solving: model.solve.is_running(),
             solved: current.is_some(),
@@ -158,6 +161,9 @@ fn target(facts: &Facts) -> (StepState, Text) {
 
 fn capture(facts: &Facts) -> (StepState, Text) {
     let Facts { captures_in_use: count, .. } = *facts;
+    if facts.no_robot {
+        return (StepState::Done, text!("{count} {count|image|images}", count = count));
+    }
     if count >= GOOD_VIEWS {
         (StepState::Done, text!("{count} poses", count = count))
     } else if count > 0 || facts.board_in_view || facts.board_captured {
@@ -168,7 +174,7 @@ fn capture(facts: &Facts) -> (StepState, Text) {
 }
 
 fn solve(facts: &Facts) -> (StepState, Text) {
-    if facts.captures_in_use < MIN_VIEWS {
+    if facts.captures_in_use < MIN_VIEWS && !facts.no_robot {
         return (StepState::Blocked, text!("Needs {count} poses", count = MIN_VIEWS));
     }
     match (facts.solving, facts.solved, facts.expected_error_m) {
@@ -183,6 +189,7 @@ fn solve(facts: &Facts) -> (StepState, Text) {
 
 fn verify(facts: &Facts) -> (StepState, Text) {
     match (facts.solved, facts.verified, facts.verifying) {
+        _ if facts.no_robot => (StepState::Blocked, text!("Needs robot poses")),
         (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
         // What fails is never ticked.
         (true, true, _) if facts.contradicted => (StepState::Now, text!("Errors larger than stated")),
@@ -201,6 +208,7 @@ fn export(facts: &Facts) -> (StepState, Text) {
 
 fn track(facts: &Facts) -> (StepState, Text) {
     match (facts.solved, facts.connected, facts.tracking) {
+        _ if facts.no_robot => (StepState::Blocked, text!("Needs robot poses")),
         (false, ..) => (StepState::Blocked, text!("Needs a calibration")),
         (true, false, _) => (StepState::Blocked, text!("Needs a connection")),
         (true, true, false) => (StepState::Now, text!("Follow the board")),
@@ -250,6 +258,17 @@ mod tests {
         let facts = Facts { captures_in_use: 12, board_in_view: true, ..Facts::default() };
         assert_eq!(said(&facts)[0].0, StepState::Now);
         assert_eq!(said(&facts)[3].0, StepState::Now);
+    }
+
+    /// Of images alone there is a camera to export, and nothing of a robot to verify or to track with.
+    #[test]
+    fn without_a_robot_the_export_comes_after_the_answer() {
+        let facts = Facts { captures_in_use: 12, no_robot: true, solved: true, ..Facts::default() };
+        let steps = said(&facts);
+        assert_eq!(steps[2], (StepState::Done, "12 images".to_owned()));
+        let needs_robot = (StepState::Blocked, "Needs robot poses".to_owned());
+        assert_eq!([&steps[4], &steps[6]], [&needs_robot, &needs_robot]);
+        assert_eq!(steps[5].0, StepState::Now);
     }
 
     #[test]

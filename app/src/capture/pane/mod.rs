@@ -181,6 +181,8 @@ pub fn hindrance(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "A capture is under way"))
     } else if model.sequence_runs {
         Some(tr!(language, "The sequence is taking the captures"))
+    } else if model.document().mode().is_none() {
+        Some(tr!(language, "This session has images without a robot: begin a new session for captures"))
     } else if !model.camera.is_connected() || model.frame.is_none() {
         Some(tr!(language, "There are no images: connect a cell first"))
     } else if !model.control.is_connected() {

@@ -11,7 +11,7 @@ use crate::capture::rows::CaptureRow;
 use crate::command::{Command, Outbox};
 use crate::gui::style::marks::{self, Marks};
 use crate::gui::style::numbers;
-use crate::gui::style::theme::{self, CAPTION, Palette, Tone};
+use crate::gui::style::theme::{CAPTION, Palette, Tone};
 use crate::live::textures::Thumbnails;
 use crate::model::Model;
 use crate::text::Language;
@@ -156,7 +156,7 @@ fn title(ui: &Ui, row: &CaptureRow, cell: Rect) {
 
 fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: Language, outbox: &mut Outbox) {
     let mut used = !row.excluded;
-    let place = Rect::from_center_size(cell.center(), theme::least(ui, 20.0, 20.0));
+    let place = Rect::from_center_size(cell.center(), Vec2::splat(ui.spacing().interact_size.y));
     let response = ui.put(place, Checkbox::without_text(&mut used));
     let name = text!("Use capture {id}", id = row.id).say(language);
     response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, used, &name));

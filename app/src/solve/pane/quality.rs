@@ -43,12 +43,18 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let quality = &solved.result.quality;
     parts::section_ui(ui, tr!(language, "Noise, as estimated from the captures"));
     stated(ui, tr!(language, "Corners"), quality.sigma_px.map(|px| format!("{px:.3} px")));
-    stated(ui, tr!(language, "Robot position"), quality.robot_sigma_mm.map(|mm| place_said(mm * 1e-3).say(language)));
-    stated(
-        ui,
-        tr!(language, "Robot rotation"),
-        quality.robot_sigma_deg.map(|deg| angle_said(deg.to_radians()).say(language)),
-    );
+    if solved.calibration.hand_eye.is_some() {
+        stated(
+            ui,
+            tr!(language, "Robot position"),
+            quality.robot_sigma_mm.map(|mm| place_said(mm * 1e-3).say(language)),
+        );
+        stated(
+            ui,
+            tr!(language, "Robot rotation"),
+            quality.robot_sigma_deg.map(|deg| angle_said(deg.to_radians()).say(language)),
+        );
+    }
     parts::section_ui(ui, tr!(language, "Residuals (not accuracy)"));
     stated(ui, tr!(language, "Fit, RMS"), quality.rms_px.map(|px| format!("{px:.3} px")));
     // Of the model as it stands, with the robot's field where there is one: that is what the noise levels explain.

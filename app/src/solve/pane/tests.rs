@@ -53,6 +53,18 @@ fn the_headline_is_the_expected_error_and_not_a_residual() {
 }
 
 #[test]
+fn a_camera_without_a_robot_has_no_error_of_a_tip() {
+    let pane = driven(sample::with_answer(|solved| {
+        solved.calibration.hand_eye = None;
+        solved.result.quality.tip_error_95_mm = None;
+    }));
+    assert!(pane.sees("There are no robot poses, so only the camera itself is calibrated."));
+    for of_robot in ["Expected error (95 %)", "Not known", "Robot position"] {
+        assert!(!pane.sees(of_robot), "{of_robot}");
+    }
+}
+
+#[test]
 fn the_goal_is_typed_in_millimetres_and_sent_in_metres() {
     let mut pane = driven(sample::solved());
     pane.type_into("Goal", "0.25");

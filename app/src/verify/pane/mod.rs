@@ -73,6 +73,8 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             Some(tr!(language, "A capture is under way"))
         } else if model.sequence_runs || model.planning {
             Some(tr!(language, "A sequence is under way"))
+        } else if model.document().mode().is_none() {
+            Some(tr!(language, "Needs robot poses"))
         } else {
             None
         };
