@@ -16,6 +16,9 @@ impl App {
             // Pressing twice must not take two.
             return;
         }
+        if self.refuses_without_robot() {
+            return;
+        }
         self.numbers.capture += 1;
         let number = self.numbers.capture;
         let options = self.model.view.capture;
@@ -32,6 +35,16 @@ impl App {
         if !has_begun && self.model.sequence_runs {
             self.break_off(None);
         }
+    }
+
+    /// Whether nothing can be captured into this session, which is said.
+    pub(crate) fn refuses_without_robot(&mut self) -> bool {
+        let refuses = self.model.document().mode().is_none();
+        if refuses {
+            let why = text!("This session has images without a robot: begin a new session for captures");
+            self.say(Severity::Warning, why);
+        }
+        refuses
     }
 
     pub(crate) fn cancel_capture(&mut self) {

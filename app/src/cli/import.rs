@@ -176,6 +176,12 @@ fn import(
     cancel: &CancelToken,
 ) -> Result<Done, Refused> {
     let refused = |error: NotUnderstood| match error {
+        NotUnderstood::Import(ImportError::NoPoses { .. }) if !recording.streams.is_empty() => {
+            Failure::failed(anyhow!(
+                "{error}. A camera without a robot is calibrated by `handeye calibrate` on the folder, with a dataset.toml that has \
+             no [robot]"
+            ))
+        }
         NotUnderstood::Import(
             ImportError::NoPoses { .. } | ImportError::NoViews { .. } | ImportError::DidNotMove { .. },
         ) => Failure::failed(error),

@@ -257,8 +257,7 @@ fn as_document(dataset: &Dataset) -> Document {
         ..start::meta(None, String::new())
     });
     for (entry, number) in dataset.entries.iter().zip(1..) {
-        let Some(base_from_tip) = entry.base_from_tip else { continue };
-        document.captures.push(CaptureRecord::new(CaptureId(number), entry.name.clone(), base_from_tip));
+        document.captures.push(CaptureRecord::new(CaptureId(number), entry.name.clone(), entry.base_from_tip));
     }
     document
 }

@@ -162,7 +162,8 @@ fn target(facts: &Facts) -> (StepState, Text) {
 fn capture(facts: &Facts) -> (StepState, Text) {
     let Facts { captures_in_use: count, .. } = *facts;
     if facts.no_robot {
-        return (StepState::Done, text!("{count} {count|image|images}", count = count));
+        let state = if count >= MIN_VIEWS { StepState::Done } else { StepState::Blocked };
+        return (state, text!("{count} {count|image|images}", count = count));
     }
     if count >= GOOD_VIEWS {
         (StepState::Done, text!("{count} poses", count = count))
@@ -174,7 +175,10 @@ fn capture(facts: &Facts) -> (StepState, Text) {
 }
 
 fn solve(facts: &Facts) -> (StepState, Text) {
-    if facts.captures_in_use < MIN_VIEWS && !facts.no_robot {
+    if facts.captures_in_use < MIN_VIEWS && facts.no_robot {
+        return (StepState::Blocked, text!("Needs {count} images", count = MIN_VIEWS));
+    }
+    if facts.captures_in_use < MIN_VIEWS {
         return (StepState::Blocked, text!("Needs {count} poses", count = MIN_VIEWS));
     }
     match (facts.solving, facts.solved, facts.expected_error_m) {
@@ -269,6 +273,9 @@ mod tests {
         let needs_robot = (StepState::Blocked, "Needs robot poses".to_owned());
         assert_eq!([&steps[4], &steps[6]], [&needs_robot, &needs_robot]);
         assert_eq!(steps[5].0, StepState::Now);
+        let few = said(&Facts { captures_in_use: 2, solved: false, ..facts });
+        assert_eq!(few[2], (StepState::Blocked, "2 images".to_owned()));
+        assert_eq!(few[3], (StepState::Blocked, "Needs 3 images".to_owned()));
     }
 
     #[test]

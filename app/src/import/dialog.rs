@@ -225,7 +225,12 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         }
         return;
     };
-    let Some(judgement) = &found.judgement else { return };
+    let Some(judgement) = &found.judgement else {
+        if found.has_images() {
+            parts::hint_ui(ui, tr!(language, "The camera alone can be calibrated with these images."));
+        }
+        return;
+    };
     let (tone, verdict) = match &judgement.verdict {
         Verdict::Decided => (Tone::Good, text!("One of {tried} explains the recording.", tried = judgement.tried)),
         Verdict::Ambiguous(_) if judgement.is_open_in_mode_alone() => (
@@ -346,7 +351,8 @@ fn buttons_ui(ui: &mut Ui, model: &Model, import: &ImportState, language: Langua
         }
         if let Some(found) = import.found.as_deref().filter(|found| found.has_images()) {
             let is_busy = import.work.is_some() || model.opening;
-            let reason = if found.has_target() { None } else { Some(tr!(language, "Say first what the target is")) };
+            let reason =
+                if found.target().is_some() { None } else { Some(tr!(language, "Say first what the target is")) };
             let reason = if is_busy { Some(tr!(language, "Just a moment…")) } else { reason };
             let button = Button::new(tr!(language, "Calibrate the camera alone"));
             let what = tr!(language, "The intrinsics from the images, without the poses of a robot");

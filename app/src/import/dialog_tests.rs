@@ -85,6 +85,7 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         opened: Arc::clone(&recording),
         recording,
         looked: None,
+        given: None,
         settings: Settings::default(),
         judgement: Some(judgement),
         previews: Arc::new(vec![vec![Arc::new(RgbImage::new(16, 12)); 4]]),
@@ -132,6 +133,20 @@ fn what_the_data_do_not_tell_waits_for_a_person() {
     pane.steps();
     assert!(pane.sees("0 views disagree"));
     assert_eq!(pane.click("Import"), [Command::ConvertRecording]);
+}
+
+#[test]
+fn the_camera_alone_is_calibrated_once_the_target_is_named() {
+    let pane = driven(Some(without_meaning(None)), None);
+    assert!(pane.sees("The camera alone can be calibrated with these images."));
+    assert!(!pane.is_enabled("Calibrate the camera alone"));
+    let given = crate::cli::target::of_text("10x7x15").expect("a target");
+    let mut pane = driven(Some(without_meaning(Some(given))), None);
+    assert_eq!(pane.click("Calibrate the camera alone"), [Command::ConvertImages]);
+}
+
+fn without_meaning(given: Option<handeye_core::targets::TargetSpec>) -> Found {
+    Found { judgement: None, given, ..two() }
 }
 
 #[test]

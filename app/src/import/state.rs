@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use handeye_core::image::RgbImage;
 use handeye_core::project::import::{Hypothesis, Judgement, Recording, Settings, Verdict};
+use handeye_core::targets::TargetSpec;
 use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 
@@ -54,6 +55,8 @@ pub struct Found {
     pub recording: Arc<Recording>,
     /// What the images show; `None` where nothing could be looked for.
     pub looked: Option<Arc<Looked>>,
+    /// The target that a person named.
+    pub given: Option<TargetSpec>,
     /// What the hypotheses were tried with.
     pub settings: Settings,
     /// The hypotheses.
@@ -70,12 +73,13 @@ impl Found {
 
     /// Whether there are images that a camera can be calibrated with, also where nothing is known of a robot.
     pub fn has_images(&self) -> bool {
-        self.recording.streams.iter().any(|stream| stream.points.is_none() && !stream.is_depth)
+        (0..self.recording.streams.len()).any(|i| self.recording.has_photographs(i))
     }
 
-    /// Whether it is known what they show.
-    pub fn has_target(&self) -> bool {
-        self.looked.as_ref().is_some_and(|looked| looked.target.is_some())
+    /// The target, and who says so, also where nothing else was made of the recording.
+    pub fn target(&self) -> Option<(TargetSpec, String)> {
+        let looked = self.looked.as_ref().and_then(|looked| looked.target.clone());
+        looked.or_else(|| Some((self.given?, "given with --target".to_owned())))
     }
 
     /// The hypothesis that needs nobody to choose it.

@@ -200,7 +200,7 @@ impl Look<'_> {
         let streams = &self.recording.streams;
         let is_wanted = |i: &usize| match &self.settings.images {
             Some(name) => *name == streams[*i].name,
-            None => !streams[*i].is_depth || streams.iter().all(|s| s.is_depth),
+            None => streams[*i].points.is_some() || self.recording.has_photographs(*i),
         };
         (0..streams.len()).filter(is_wanted).collect()
     }

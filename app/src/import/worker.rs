@@ -153,7 +153,9 @@ fn look(
     // Of images of a moving robot only some are left.
     let known = known.filter(|known| Arc::ptr_eq(&known.recording, &recording));
     let previews = known.map_or_else(|| Arc::new(previews(&recording)), |known| Arc::clone(&known.previews));
-    let mut found = Found { opened, recording, looked: None, settings: settings.clone(), judgement: None, previews };
+    let settings_used = settings.clone();
+    let mut found =
+        Found { opened, recording, looked: None, given: target, settings: settings_used, judgement: None, previews };
     let outcome = looked.and_then(|looked| {
         let judgement = looked.judge(settings, cancel);
         found.looked = Some(Arc::new(looked));
@@ -164,7 +166,7 @@ fn look(
 }
 
 fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
-    let Found { opened, recording, looked, previews, .. } = known;
+    let Found { opened, recording, looked, given, previews, .. } = known;
     let (opened, recording, previews) = (Arc::clone(opened), Arc::clone(recording), Arc::clone(previews));
     let looked = looked.clone();
     let judgement = looked.as_ref().map(|looked| looked.judge(settings, cancel)).transpose();
@@ -172,7 +174,8 @@ fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
         Ok(judgement) => (judgement, None),
         Err(error) => (None, Some(said(error))),
     };
-    (Some(Found { opened, recording, looked, settings: settings.clone(), judgement, previews }), trouble)
+    let (given, settings) = (*given, settings.clone());
+    (Some(Found { opened, recording, looked, given, settings, judgement, previews }), trouble)
 }
 
 fn previews(recording: &Recording) -> Vec<Vec<Arc<RgbImage>>> {
@@ -209,8 +212,7 @@ fn convert(known: &Found, hypothesis: usize, is_taken: bool, number: u64, outlet
 }
 
 fn convert_images(known: &Found, number: u64, outlet: &Outlet) -> Result<Converted, Text> {
-    let target = known.looked.as_ref().and_then(|looked| looked.target.as_ref());
-    let plan = target.and_then(|target| import::plan_images(&known.recording, &known.settings, target));
+    let plan = known.target().and_then(|target| import::plan_images(&known.recording, &known.settings, &target));
     written(plan.ok_or_else(|| text!("nothing was found"))?, &known.recording, number, outlet)
 }
 

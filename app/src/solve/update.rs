@@ -64,6 +64,14 @@ impl App {
             self.desk.cancel_solve();
             self.model.solve.status = if document.captures.is_empty() {
                 SolveStatus::Idle
+            } else if document.mode().is_none() {
+                SolveStatus::Failed {
+                    why: text!(
+                        "{seen} {seen|image|images} with the board in use, at least {need} are needed",
+                        seen = seen,
+                        need = MIN_VIEWS
+                    ),
+                }
             } else {
                 SolveStatus::Failed {
                     why: text!(

@@ -18,8 +18,10 @@ pub fn target_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     form::body_ui(ui, |ui| {
         board_ui(ui, model, outbox);
         ui.add_space(4.0);
-        mode_ui(ui, model, outbox);
-        ui.add_space(4.0);
+        if model.document().mode().is_some() {
+            mode_ui(ui, model, outbox);
+            ui.add_space(4.0);
+        }
         camera_ui(ui, model, outbox);
     });
 }
@@ -54,7 +56,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let fixed = camera.is_some_and(|camera| camera.fixed);
     form::heading_ui(ui, tr!(language, "Camera intrinsics"));
     let choices = [
-        (false, tr!(language, "Estimate"), tr!(language, "From the same captures as the hand-eye")),
+        (false, tr!(language, "Estimate"), tr!(language, "From the captures")),
         (true, tr!(language, "Fixed"), tr!(language, "Known from an earlier calibration, and taken as exact")),
     ];
     if let Some(fixed) = form::choice_ui(ui, fixed, &choices) {
@@ -65,7 +67,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         })));
     }
     let Some(CameraInput { intrinsics: Some(before), .. }) = camera.filter(|camera| camera.fixed) else {
-        parts::hint_ui(ui, tr!(language, "Focal lengths, principal point and lens are estimated with the hand-eye."));
+        parts::hint_ui(ui, tr!(language, "Focal lengths, principal point and lens are estimated from the captures."));
         return;
     };
     let mut now = before;

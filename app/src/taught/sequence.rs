@@ -22,6 +22,9 @@ impl App {
             self.say(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
             return;
         }
+        if purpose.is_some() && self.refuses_without_robot() {
+            return;
+        }
         self.begin_sequence(PoseSequence {
             names,
             planned: None,

@@ -306,7 +306,7 @@ mod slow {
     /// From a stop to an arm at rest, by the clock of the cell \[s\], on a machine that has time for it.
     const AT_REST_S: f64 = 0.3;
 
-    /// So many of the workbench. After every third one, another client asks the cell for it: what differs among those is how late a stop
+    /// How many stops by the workbench. After every third one, another client asks the cell for it: what differs among those is how late a stop
     /// is on a machine that is busy with other things.
     const STOPS: usize = 100;
 
@@ -320,8 +320,10 @@ mod slow {
 
         /// Time and joints of one and the same pass.
         fn seen(&mut self) -> (f64, JointValues) {
+            let deadline = Instant::now() + PATIENCE;
             let mut before_s = self.time_s();
             loop {
+                assert!(Instant::now() < deadline, "no call is answered within a pass");
                 let (joints, after_s) = (self.joints(), self.time_s());
                 if after_s <= before_s {
                     return (after_s, joints);

@@ -369,7 +369,7 @@ fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_
         "what is in sight is said: {notes:?}"
     );
     bench.click(AppCommand::SetImportTarget("10x7x15".to_owned()));
-    bench.until("the target", |model| import(model).and_then(|it| it.found).is_some_and(|it| it.has_target()));
+    bench.until("the target", |model| import(model).and_then(|it| it.found).is_some_and(|it| it.target().is_some()));
     bench.click(AppCommand::ConvertImages);
     bench.until("the session", |model| model.document().captures.len() == 12 && model.dialog.is_none());
     bench.until("a solution", |model| model.solve.fresh && model.solve.solved.is_some());

@@ -173,7 +173,7 @@ fn menu_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, row: &CaptureRow, o
     if every(|row| row.role == Role::Verification) {
         let command = Command::SetPurpose { ids: ids.clone(), purpose: CapturePurpose::Calibrate };
         item(ui, tr!(language, "Use for the fit"), command);
-    } else {
+    } else if model.document().mode().is_some() {
         let command = Command::SetPurpose { ids: ids.clone(), purpose: CapturePurpose::Verify };
         item(ui, tr!(language, "Use for verification"), command);
     }

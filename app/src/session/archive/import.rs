@@ -201,6 +201,15 @@ mod tests {
             assert!(!why.contains("secret:") && !why.contains("root"), "{why}");
             assert!(!sessions.exists(), "nothing was begun");
         }
+        let alone = "[target]\nkind = \"chessboard\"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n";
+        for image in ["../../private.png", "linked.png", absolute.as_str(), "../../not-there.png"] {
+            fs::write(upload.join("dataset.toml"), format!("images = ['{image}']\n{alone}")).expect("written");
+            archive.open(&upload, &Bounds::within(&upload));
+            let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("{image} was opened") };
+            let why = why.say(Language::English);
+            assert!(why.contains("outside of the folder") || why.contains("a path relative"), "{image}: {why}");
+            assert!(!sessions.exists(), "nothing was begun");
+        }
         // Somebody at this machine may.
         fs::write(upload.join("dataset.toml"), described.replace("POSES", "poses.csv")).expect("written");
         fs::write(upload.join("poses.csv"), format!("{header}../../private.png,0.4,0,0.3,0,0,0,1\n")).expect("written");

@@ -53,7 +53,9 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 fn without_verification(model: &Model) -> &'static str {
     let language = model.view.language;
     let is_kept = model.document().captures.iter().any(|it| it.role == Role::Verification && !it.excluded);
-    if !is_kept {
+    if model.document().mode().is_none() {
+        tr!(language, "A camera without a robot predicts no place of the board: there is nothing to verify.")
+    } else if !is_kept {
         tr!(language, "No captures for verification yet. About ten are needed for a meaningful average.")
     } else if model.solve.fresh {
         tr!(language, "The board was not found in any capture for verification.")
@@ -65,7 +67,9 @@ fn without_verification(model: &Model) -> &'static str {
 fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     ui.horizontal(|ui| {
-        let reason = if !model.camera.is_connected() || !model.control.is_connected() {
+        let reason = if model.document().mode().is_none() {
+            Some(tr!(language, "Needs robot poses"))
+        } else if !model.camera.is_connected() || !model.control.is_connected() {
             Some(tr!(language, "Not connected: there is nothing to capture"))
         } else if model.resting_simulation().is_some() {
             Some(tr!(language, "Images are updated only while the simulation runs"))
@@ -73,8 +77,6 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             Some(tr!(language, "A capture is under way"))
         } else if model.sequence_runs || model.planning {
             Some(tr!(language, "A sequence is under way"))
-        } else if model.document().mode().is_none() {
-            Some(tr!(language, "Needs robot poses"))
         } else {
             None
         };

@@ -6,7 +6,6 @@ use handeye_core::verify::Verification;
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;
 use crate::model::Model;
-use crate::wording::Value;
 use crate::{text, tr};
 
 /// A ratio below that would be shown as zero.
@@ -33,11 +32,8 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
     let (colour, verdict) = match &verification.consistency {
         None => (palette.weak, text!("The calibration states no uncertainty to compare these errors with")),
         Some(consistency) => {
-            let ratio: Value = if consistency.ratio < LEAST_RATIO {
-                text!("below {high}", high = format!("{LEAST_RATIO:.2}")).into()
-            } else {
-                format!("{:.2}", consistency.ratio).into()
-            };
+            let is_least = consistency.ratio < LEAST_RATIO;
+            let ratio = if is_least { format!("<{LEAST_RATIO:.2}") } else { format!("{:.2}", consistency.ratio) };
             let limit = format!("{:.2}", consistency.limit);
             if consistency.is_consistent() {
                 let text = text!(

@@ -74,7 +74,7 @@ fn errors_next_to_nothing_are_not_said_with_zeros() {
             verification.consistency.as_mut().expect("stated").ratio = 1e-5;
         }
     }));
-    assert!(pane.sees("their mean square is below 0.01 times the expected one"));
+    assert!(pane.sees("their mean square is <0.01 times the expected one"));
 }
 
 #[test]

@@ -211,6 +211,9 @@ impl Config {
                 "images names those of a camera without a robot: with [robot] its pose table names them",
             ));
         }
+        if self.corners.is_some() && self.images.is_some() {
+            return Err(DatasetProblem::Conflict("the table of corners names the images: remove images or corners"));
+        }
         if self.robot.is_none() && self.target_poses.is_some() {
             return Err(DatasetProblem::Conflict("[target] poses need the robot's: add [robot]"));
         }

@@ -36,7 +36,7 @@ pub mod write;
 
 pub use entry::Entry;
 pub use images::holds_images;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, RgbImage};
@@ -364,11 +364,12 @@ fn views(
 }
 
 fn named_images(names: &[String]) -> Result<Vec<View>, DatasetProblem> {
-    let mut views: Vec<View> = Vec::with_capacity(names.len());
+    let mut views = Vec::with_capacity(names.len());
+    let mut known = BTreeSet::new();
     for name in names {
         let bad = |want| DatasetProblem::BadValue { key: "images", value: format!("{:?}", error::shown(name)), want };
-        let path = text::resolve(Path::new(""), name).ok_or_else(|| bad("paths in this folder"))?;
-        if views.iter().any(|view| view.path == path) {
+        let path = text::resolve(Path::new(""), name).ok_or_else(|| bad("a path relative to this folder"))?;
+        if !known.insert(path.clone()) {
             return Err(bad("every image once"));
         }
         views.push(View::of_image(name.clone(), path));

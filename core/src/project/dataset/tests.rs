@@ -142,7 +142,7 @@ fn without_a_robot_the_images_that_count_can_be_named() {
     assert_eq!(names, ["images/c.png", "a.png"]);
     for (named, why) in [
         ("['a.png', './a.png']", "every image once"),
-        ("['a.png', '/b.png']", "paths in this folder"),
+        ("['a.png', '/b.png']", "a path relative to this folder"),
         ("[]", "at least one image"),
         ("['d.png']", "d.png"),
     ] {

@@ -55,6 +55,13 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Whether the images of a stream, by its place, are photographs. Those of 16 bits of grey are depths where there are others.
+    pub fn has_photographs(&self, stream: usize) -> bool {
+        let is_depth = |stream: &Stream| stream.is_depth && stream.points.is_none();
+        self.streams.get(stream).is_some_and(|it| it.points.is_none())
+            && (!is_depth(&self.streams[stream]) || self.streams.iter().all(is_depth))
+    }
+
     /// The files of the images of a stream, by its place in [`streams`](Self::streams).
     pub fn image_paths(&self, stream: usize) -> Vec<PathBuf> {
         self.streams[stream].images.iter().map(|image| self.root.join(&image.path)).collect()

@@ -5,12 +5,13 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::camera::chosen as chosen_camera;
 use super::conventions::AngleUnit;
 use super::error::ImportError;
 use super::folder::unreadable;
 use super::hypothesis::{Hypothesis, Source};
 use super::judge::{Judgement, TIMES};
-use super::recording::{FoundCamera, ImageFile, Recording, Track};
+use super::recording::{FoundCamera, ImageFile, Recording, Stream, Track};
 use super::settings::Settings;
 use super::sight::{recorded_corners, size_of_points};
 use crate::geometry::frames::{Base, Pose, Tip};
@@ -193,30 +194,36 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
 }
 
 /// Plans the folder of images alone, to calibrate the camera by itself: those that a person named, or else those of the stream
-/// that has most. `None` where there are no images; depth images are none.
+/// that has most; what is not taken is said. A lens that files describe is where the estimate starts, with its model. `None` where
+/// there are no images; depth images are none.
 pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetSpec, String)) -> Option<Plan> {
-    let streams = recording.streams.iter().filter(|stream| stream.points.is_none() && !stream.is_depth);
-    let stream = match &settings.images {
-        Some(name) => streams.into_iter().find(|stream| stream.name == *name),
-        None => streams.rev().max_by_key(|stream| stream.images.len()),
+    let photographs = (0..recording.streams.len()).filter(|i| recording.has_photographs(*i));
+    let streams: Vec<&Stream> = photographs.map(|i| &recording.streams[i]).collect();
+    let stream = *match &settings.images {
+        Some(name) => streams.iter().find(|stream| stream.name == *name),
+        None => streams.iter().rev().max_by_key(|stream| stream.images.len()),
     }?;
+    let others = streams.iter().filter(|other| other.name != stream.name);
+    let mut left_out: Vec<String> = others
+        .map(|other| format!("{} images {}: another camera or another series", other.images.len(), other.name))
+        .collect();
+    let copies = stream.images.iter().filter_map(|image| Some((image, &stream.images[image.same_as?])));
+    left_out.extend(copies.map(|(copy, image)| format!("{}: a copy of {}", copy.shown(), image.shown())));
+    let camera = chosen_camera(recording, stream.size, settings).ok().and_then(|(camera, _)| camera);
+    let camera = camera.map(|camera| CameraInput {
+        fixed: false,
+        intrinsics: Some(camera.intrinsics),
+        model: camera.intrinsics.distortion,
+    });
     let mut names = Names { link_to: None, root: &recording.root, taken: BTreeSet::new() };
     let named = |(index, image): (usize, &ImageFile)| (recording.root.join(&image.path), names.of(&image.path, index));
-    let images: Vec<_> = stream.images.iter().enumerate().map(named).collect();
+    let images: Vec<_> = stream.images.iter().filter(|it| it.same_as.is_none()).enumerate().map(named).collect();
     let (target, why) = target;
     let mut text = String::new();
     comment(&mut text, &format!("Images alone, without a robot: {}. The target is {why}.", stream.name));
-    text.push_str(&description_of_images(images.iter().map(|(_, name)| name.as_str()), target, None));
+    text.push_str(&description_of_images(images.iter().map(|(_, name)| name.as_str()), target, camera.as_ref()));
     let views = images.len();
-    Some(Plan {
-        description: text,
-        poses: None,
-        target_poses: None,
-        corners: None,
-        images,
-        views,
-        left_out: Vec::new(),
-    })
+    Some(Plan { description: text, poses: None, target_poses: None, corners: None, images, views, left_out })
 }
 
 /// Corners that stand for images, and the size of those.

@@ -30,21 +30,21 @@ impl Document {
 
     /// The session's `dataset.toml` and `poses.csv`: the captures in use and no others, so that the command line solves
     /// what the window solves. Joint values are there when the arm or the kinds of its joints are known and every one of
-    /// these captures has them.
-    pub(super) fn as_dataset(&self) -> (String, String) {
+    /// these captures has them. Without a robot there is no table.
+    pub(super) fn as_dataset(&self) -> (String, Option<String>) {
         let meta = &self.meta;
         let describe = |joints| dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), joints);
         if self.mode().is_none() {
             let images = self.in_use().map(|capture| capture.image.as_str());
             let description = dataset::write::description_of_images(images, &meta.target, meta.camera.as_ref());
-            return (description, dataset::write::pose_table(std::iter::empty()));
+            return (description, None);
         }
         if let Some((joints, table)) = self.joints().and_then(|joints| Some((joints, self.table_with_joints(joints)?)))
         {
-            return (describe(Some(joints)), table);
+            return (describe(Some(joints)), Some(table));
         }
         let views = self.in_use().filter_map(|capture| Some((capture.image.as_str(), capture.base_from_tip.as_ref()?)));
-        (describe(None), dataset::write::pose_table(views))
+        (describe(None), Some(dataset::write::pose_table(views)))
     }
 
     fn joints(&self) -> Option<Joints<'_>> {

@@ -56,6 +56,7 @@ fn a_session_without_an_arm_is_the_data_set_that_it_was_before_there_were_any() 
     let store = store(dir.path(), None);
     assert_eq!(store.document().tip_by_joint(), Ok(BTreeMap::new()));
     let (description, table) = store.document().as_dataset();
+    let table = table.expect("it has a robot");
     assert!(!description.contains("joint") && table.starts_with("image,x,y,z,qx,qy,qz,qw\n"), "{description}");
     let json = std::fs::read_to_string(dir.path().join("session.json")).expect("read");
     assert!(!json.contains("\"arm\""));

@@ -34,10 +34,9 @@ impl Derived {
         let json = session_file::to_json(document, sequence, history.last_capture())
             .map_err(|problem| SessionError::new(&folder.join(DOCUMENT), problem))?;
         let (description, pose_table) = document.as_dataset();
-        for ((name, text), written) in NAMES.into_iter().zip([description, pose_table, json]).zip(&mut self.written) {
-            if written.as_ref() == Some(&text) {
-                continue;
-            }
+        let texts = [Some(description), pose_table, Some(json)];
+        for ((name, text), written) in NAMES.into_iter().zip(texts).zip(&mut self.written) {
+            let Some(text) = text.filter(|text| written.as_ref() != Some(text)) else { continue };
             // Not known until it is written.
             *written = None;
             let path = folder.join(name);

@@ -113,7 +113,9 @@ pub(super) fn input_sha256(folder: &Path, document: &Document) -> Result<String,
     let (description, pose_table) = document.as_dataset();
     let mut listing = Listing::default();
     listing.add(dataset::DESCRIPTION, description.as_bytes());
-    listing.add(dataset::write::POSE_TABLE, pose_table.as_bytes());
+    if let Some(pose_table) = pose_table {
+        listing.add(dataset::write::POSE_TABLE, pose_table.as_bytes());
+    }
     for capture in document.in_use() {
         let path = folder.join(&capture.image);
         listing.add_file(&capture.image, &path).map_err(|e| SessionError::unreadable(&path, &e))?;

@@ -122,12 +122,14 @@ impl Store {
     /// Records a capture.
     ///
     /// # Errors
-    /// [`SessionProblem::Edit`] when the capture cannot be part of the session (not finite, another image size);
+    /// [`SessionProblem::Edit`] when the capture cannot be part of the session (not finite, another image size, a
+    /// pose of the robot among captures without one or the reverse);
     /// otherwise as [`Self::apply`].
     pub fn add_capture(&mut self, capture: &Capture<'_>) -> Result<CaptureId, SessionError> {
         let refused = |e| SessionError::new(&self.folder, SessionProblem::Edit(e));
         let id = self.history.next_capture_id().map_err(refused)?;
         let record = capture.record(id, self.image_size()?).map_err(refused)?;
+        self.document().check_robot(&record).map_err(refused)?;
         // The files first: from the moment the journal names them, they are whole.
         capture.write_files(&self.folder, &record)?;
         self.apply(Edit::AddCapture(Box::new(record)))?;

@@ -154,6 +154,10 @@ fn images_alone_are_a_session_without_a_robot_and_their_data_set_has_those_in_us
     let names: Vec<&str> = data.entries.iter().map(|entry| entry.name.as_str()).collect();
     assert_eq!((data.mode, data.camera), (None, meta().camera));
     assert_eq!(names, ["images/0001.png", "images/0003.png", "images/0004.png"]);
+    let of_session = Session::open(dir.path()).and_then(|session| session.input_sha256()).expect("read");
+    assert_eq!(data.input_sha256().expect("read"), of_session);
+    let files: Vec<_> = std::fs::read_dir(dir.path().join("images")).expect("a folder").collect();
+    assert_eq!(files.len(), 4, "what was refused left nothing behind");
 
     let other = folder();
     let mut with_robot = store_with(other.path(), 1);

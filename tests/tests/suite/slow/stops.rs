@@ -15,7 +15,7 @@ use tungstenite::Message;
 /// From STOP to an arm at rest, by the clock of the cell \[s\], on a machine that has time for it.
 const AT_REST_S: f64 = 0.3;
 
-/// So many at a page. After every third one, a client asks the cell itself, without the workbench: what differs among those is how
+/// How many stops at a page. After every third one, a client asks the cell itself, without the workbench: what differs among those is how
 /// late a stop is on a machine that is busy with other things.
 const STOPS: usize = 100;
 
@@ -98,8 +98,10 @@ fn time_s(arm: &mut Arm) -> f64 {
 
 /// Time and joints of one and the same pass.
 fn seen(arm: &mut Arm) -> (f64, JointValues) {
+    let deadline = Instant::now() + PATIENCE;
     let mut before_s = time_s(arm);
     loop {
+        assert!(Instant::now() < deadline, "no call is answered within a pass");
         let joints = arm.joint_values().expect("a call");
         let after_s = time_s(arm);
         if after_s <= before_s {
