@@ -94,8 +94,8 @@ fn images_that_come_too_often_are_thinned_and_not_counted_as_lost() {
 
 #[test]
 fn images_that_a_slow_writer_did_not_take_are_counted() {
-    let queue = Queue::new(&rates(Rate::newest_every(Duration::ZERO)));
     let began = Instant::now();
+    let queue = Queue::new(&rates(Rate::newest_every(Duration::ZERO)));
     let mut put = 0;
     while queue.left_out() < 3 {
         queue.put(image(put));

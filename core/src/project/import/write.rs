@@ -220,7 +220,7 @@ pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetS
     let images: Vec<_> = stream.images.iter().filter(|it| it.same_as.is_none()).enumerate().map(named).collect();
     let (target, why) = target;
     let mut text = String::new();
-    comment(&mut text, &format!("Images alone, without a robot: {}. The target is {why}.", stream.name));
+    comment(&mut text, format!("Images alone, without a robot: {}. The target is {why}.", stream.name));
     text.push_str(&description_of_images(images.iter().map(|(_, name)| name.as_str()), target, camera.as_ref()));
     let views = images.len();
     Some(Plan { description: text, poses: None, target_poses: None, corners: None, images, views, left_out })

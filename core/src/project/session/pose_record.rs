@@ -43,6 +43,7 @@ pub fn deserialize<'de, Dst, Src, D: Deserializer<'de>>(deserializer: D) -> Resu
 pub mod optional {
     use super::{Deserialize, Deserializer, Pose, Record, Serialize, Serializer};
 
+    #[expect(clippy::ref_option, reason = "serde passes a reference to the field")]
     pub fn serialize<Dst, Src, S: Serializer>(pose: &Option<Pose<Dst, Src>>, serializer: S) -> Result<S::Ok, S::Error> {
         pose.as_ref().map(Record::of).serialize(serializer)
     }
