@@ -334,8 +334,8 @@ def a_folder_reads_to_the_numbers_in_it_and_solves_as_on_the_command_line(rng):
         else:
             near(data.camera_from_target, s.camera_from_target, 1e-14)
             assert data.corners is None and data.image_paths == [None] * 12
-        # 0.5 mm is the goal of the command line.
-        result = handeye.calibrate(data, goal_mm=0.5)
+        # 0.3 mm is the goal of the command line.
+        result = handeye.calibrate(data, goal_mm=0.3)
         output = os.path.join(folder, kind + ".json")
         subprocess.run([binary, "calibrate", path, "--quiet", "--json", output], check=True, stdout=subprocess.DEVNULL)
         with open(output) as file:
