@@ -15,9 +15,15 @@ use tungstenite::Message;
 /// From STOP to an arm at rest, by the clock of the cell \[s\], on a machine that has time for it.
 const AT_REST_S: f64 = 0.3;
 
-/// How many stops at a page. After every third one, a client asks the cell itself, without the workbench: what differs among those is how
-/// late a stop is on a machine that is busy with other things.
+/// How many stops at a page of the workbench that draws. Half as many go, in turn with them, through a workbench beside it that
+/// has nothing to draw: the same way, on the same machine at the same time. Whatever else a machine is busy with makes stops of
+/// both late; waiting for a frame makes those of the first late.
 const STOPS: usize = 100;
+
+/// How many standard deviations more late stops the first may have than twice those of the second. If a stop of either is late
+/// with the same small probability, the difference has a variance of twice the number of late stops: more than four come of
+/// chance once in thirty thousand runs.
+const DEVIATIONS: f64 = 4.0;
 
 /// Passes of the cell, short enough to tell how long it took \[s\].
 const TIME_STEP_S: &str = "0.01";
@@ -26,7 +32,7 @@ const TIME_STEP_S: &str = "0.01";
 const SHARE: f64 = 0.25;
 
 /// An arm that stays where it is for so long \[s\] is at rest.
-const STILL_S: f64 = 0.3;
+const STILL_S: f64 = 0.15;
 
 /// Bytes that are pasted at once: as many as a message has room for.
 const PASTED: usize = 60_000;
@@ -138,6 +144,7 @@ fn stop_at_a_page_waits_for_no_frame() {
     let mut watch = arm(&cell);
     watch.sim().start_simulation().expect("it starts");
     let served = Served::start(&["--connect", &Endpoint::local(cell.port()).to_string()]);
+    let idle = Served::start(&["--connect", &Endpoint::local(cell.port()).to_string()]);
     let (ends, escapes, frames) = (AtomicBool::new(false), AtomicU64::new(0), AtomicU64::new(0));
     let driver = served.page("driver");
     std::thread::scope(|scope| {
@@ -153,10 +160,14 @@ fn stop_at_a_page_waits_for_no_frame() {
             assert!(Instant::now() < deadline, "there are no frames");
         }
         let (began, drawn) = (Instant::now(), frames.load(Ordering::Acquire));
-        let (mut took, mut direct) = (Vec::new(), Vec::new());
-        for trial in 0..STOPS + STOPS / 3 {
-            // A page that is not heard from for a while is let go of.
-            let mut watcher = served.page("watcher");
+        let (mut took, mut beside) = (Vec::new(), Vec::new());
+        for trial in 0..STOPS + STOPS / 2 {
+            // A page that is not heard from for a while is let go of: each trial has its own.
+            let mut page = match trial % 3 {
+                0 => Some(served.page("watcher")),
+                1 => None,
+                _ => Some(idle.page("watcher")),
+            };
             let at = watch.joint_values().expect("a call");
             let mut goal = start;
             goal[0] += if at[0] > start[0] { -2.0 } else { 2.0 };
@@ -167,43 +178,38 @@ fn stop_at_a_page_waits_for_no_frame() {
                 mover
             });
             until_moving(&mut watch, &at);
-            let until_s = time_s(&mut watch) + random.random_range(0.0..0.5);
+            let until_s = time_s(&mut watch) + random.random_range(0.0..0.2);
             while time_s(&mut watch) < until_s {}
             let pressed_s = time_s(&mut watch);
-            let took = match trial % 4 {
-                0 | 2 => {
-                    tell(&mut watcher, &json!({"t": "stop"}));
-                    &mut took
-                }
-                1 => {
-                    escapes.fetch_add(1, Ordering::AcqRel);
-                    &mut took
-                }
-                _ => {
-                    watch.sim().connection().call("handeye.stop", Vec::new()).expect("it brakes");
-                    &mut direct
-                }
-            };
-            took.push(last_moved_s(&mut watch) - pressed_s);
+            if let Some(page) = &mut page {
+                tell(page, &json!({"t": "stop"}));
+            } else {
+                escapes.fetch_add(1, Ordering::AcqRel);
+            }
+            let times = if trial % 3 == 2 { &mut beside } else { &mut took };
+            times.push(last_moved_s(&mut watch) - pressed_s);
             mover = moving.join().expect("it ends");
         }
         let drawn = frames.load(Ordering::Acquire) - drawn;
         drop(over);
-        let [took, direct] = [took, direct].map(|mut times: Vec<f64>| {
+        for times in [&mut took, &mut beside] {
             times.sort_by(f64::total_cmp);
-            times
-        });
+        }
         println!(
-            "{drawn} frames of {:.2} s each; at rest after {:.3} s in the median, {:.3} s at most, of the cell's time; asked \
-             for directly, {:.3} s and {:.3} s",
+            "{drawn} frames of {:.2} s each; at rest after {:.3} s in the median, {:.3} s at most, of the cell's time; through \
+             the workbench that draws nothing, {:.3} s and {:.3} s",
             began.elapsed().as_secs_f64() / drawn.max(1) as f64,
-            took[took.len() / 2],
-            took[took.len() - 1],
-            direct[direct.len() / 2],
-            direct[direct.len() - 1]
+            took[STOPS / 2],
+            took[STOPS - 1],
+            beside[STOPS / 4],
+            beside[STOPS / 2 - 1]
         );
-        assert_eq!((took.len(), direct.len()), (STOPS, STOPS / 3));
-        let late_s = direct[direct.len() - 1] - direct[direct.len() / 2];
-        assert!(took[STOPS - 1] <= AT_REST_S + late_s, "{took:?}\ndirectly: {direct:?}");
+        let [late, late_beside] = [&took, &beside].map(|times| times.iter().filter(|s| **s > AT_REST_S).count() as f64);
+        assert!(
+            late - 2.0 * late_beside <= DEVIATIONS * (2.0 * (late + late_beside)).sqrt(),
+            "{took:?}\nbeside: {beside:?}"
+        );
+        // Where half of them are late, a busy machine is no explanation: braking itself takes half of the time.
+        assert!(took[STOPS / 2] <= AT_REST_S, "{took:?}\nbeside: {beside:?}");
     });
 }
