@@ -93,6 +93,12 @@ impl Kind {
     }
 }
 
+/// One of every kind that can be chosen, as it is at first.
+#[cfg(test)]
+pub fn every_kind(before: &TargetSpec) -> [TargetSpec; 6] {
+    Kind::ALL.map(|kind| kind.first(before))
+}
+
 /// The board.
 pub fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;

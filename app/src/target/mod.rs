@@ -1,6 +1,6 @@
 //! The target, the camera and where it is mounted.
 
-mod board;
+pub(crate) mod board;
 mod drawing;
 pub(crate) mod pane;
 pub(crate) mod print;

@@ -6,12 +6,15 @@ use handeye_core::geometry::frames::Pose;
 use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::{Grid, TargetSpec};
+use handeye_core::testing::{Scene, looking_at_point};
+use nalgebra::Vector2;
 
 use super::VisionTask;
 use super::bench::{Table, request};
 use crate::capture::CaptureRequest;
 use crate::capture::drawn::{BOARD, board};
 use crate::model::{CaptureOptions, CaptureWait, RefusalKind};
+use crate::target::board::every_kind;
 use crate::text::Language;
 
 fn watching(target: TargetSpec) -> Table {
@@ -37,6 +40,30 @@ fn the_newest_image_is_searched_and_the_others_are_counted() {
     let distance_m = detection.camera_from_target.expect("a pose").translation().z;
     assert!((distance_m - 0.25).abs() < 1e-3, "{distance_m} m");
     assert!(table.detections.take().is_none(), "one search only");
+}
+
+#[test]
+fn every_kind_of_board_that_can_be_chosen_is_found_live_at_its_place() {
+    let camera = Intrinsics::pinhole(640, 480, 581.0);
+    for target in every_kind(&BOARD) {
+        let centre = target.centre();
+        let middle = Vector2::new(8.0, -5.0);
+        let camera_from_target = looking_at_point(&centre, &camera, 0.5, [0.4, 0.7, 0.1], middle);
+        let grey = Scene::drawn(target, camera, camera_from_target).render(1);
+        let image = RgbImage::from_fn(640, 480, |x, y| Rgb([grey.get_pixel(x, y)[0]; 3]));
+        let mut table = watching(target);
+        table.ask(VisionTask::SetIntrinsics(camera));
+        table.put(&image);
+        table.turn();
+        let (detection, _) = table.detections.take().expect("a detection");
+        // Of a board of many small tags some may be missed, at the foreshortened end.
+        let count = detection.corners.expect("it is there").len();
+        assert!(4 * count >= 3 * target.points().len(), "{target}: {count}");
+        let found = detection.camera_from_target.expect("a pose");
+        let off = (found.isometry() * centre - camera_from_target * centre).norm();
+        // The depth of one view of a single tag, 115 px wide: 0.1 px are half a millimetre.
+        assert!(off < 2e-3, "{target}: {off} m");
+    }
 }
 
 #[test]

@@ -113,6 +113,9 @@ fn search(
     let mut parameters = DetectorParameters::create().map_err(&refused)?;
     parameters.set_marker_border_bits(border_bits as i32);
     parameters.set_corner_refinement_method(method);
+    // OpenCV keeps the outermost of quads whose corners are near each other, as a part of the perimeter. That of the paper around a
+    // tag with one cell of margin is 0.035 away, that of a square around the marker of a ChArUco board 0.02.
+    parameters.set_min_marker_distance_rate(0.01);
     if effort == Effort::Thorough {
         // Markers down to a hundredth of the image, and windows for larger ones in uneven light.
         parameters.set_min_marker_perimeter_rate(0.015);
@@ -129,9 +132,18 @@ fn search(
             Some(Marker { id: usize::try_from(id).ok()?, corners })
         })
         .collect();
+    // The edge of one marker has an inner and an outer contour, and the outer one is its outline.
+    markers.sort_by(|a, b| b.side_px().total_cmp(&a.side_px()).then(a.corners[0].x.total_cmp(&b.corners[0].x)));
+    let mut found: Vec<Marker> = Vec::with_capacity(markers.len());
+    for marker in markers {
+        let is_of = |outer: &Marker| (outer.centre() - marker.centre()).norm() < 0.5 * outer.side_px();
+        if !found.iter().any(|outer| outer.id == marker.id && is_of(outer)) {
+            found.push(marker);
+        }
+    }
     // OpenCV searches in parallel; the order must not depend on it.
-    markers.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners[0].x.total_cmp(&b.corners[0].x)));
-    Ok(markers)
+    found.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners[0].x.total_cmp(&b.corners[0].x)));
+    Ok(found)
 }
 
 /// The largest set of markers that lie to their neighbours as the target has them; `place` tells the corners of a marker
