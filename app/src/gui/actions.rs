@@ -114,7 +114,10 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
     let takes = hindrance.is_none();
     let moves = crate::taught::pane::immovable(model).is_none();
     let has_poses = !model.document().taught.is_empty();
-    let run = |name, purpose| plain(name, Command::RunSequence { purpose }, moves && has_poses);
+    let has_robot = crate::capture::pane::needs_robot(model).is_none();
+    let run = |name, purpose: Option<CapturePurpose>| {
+        plain(name, Command::RunSequence { purpose }, moves && has_poses && (has_robot || purpose.is_none()))
+    };
     let sequence = model.sequence.as_ref().filter(|_| model.sequence_runs);
     let asks = model.asked.is_some();
     let hand = model.by_hand.as_ref();

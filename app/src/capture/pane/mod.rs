@@ -181,8 +181,8 @@ pub fn hindrance(model: &Model) -> Option<&'static str> {
         Some(tr!(language, "A capture is under way"))
     } else if model.sequence_runs {
         Some(tr!(language, "The sequence is taking the captures"))
-    } else if model.document().mode().is_none() {
-        Some(tr!(language, "This session has images without a robot: begin a new session for captures"))
+    } else if let Some(why) = needs_robot(model) {
+        Some(why)
     } else if !model.camera.is_connected() || model.frame.is_none() {
         Some(tr!(language, "There are no images: connect a cell first"))
     } else if !model.control.is_connected() {
@@ -190,6 +190,12 @@ pub fn hindrance(model: &Model) -> Option<&'static str> {
     } else {
         None
     }
+}
+
+/// Why no capture can be taken into this session at all.
+pub fn needs_robot(model: &Model) -> Option<&'static str> {
+    let why = || tr!(model.view.language, "This session has images without a robot: begin a new session for captures");
+    model.document().mode().is_none().then(why)
 }
 
 fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: Language, outbox: &mut Outbox) {

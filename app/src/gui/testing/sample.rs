@@ -192,6 +192,15 @@ pub fn captured() -> Model {
     model
 }
 
+/// As [`captured`], of images without a robot.
+pub fn images_alone() -> Model {
+    let mut model = captured();
+    for capture in &mut Arc::make_mut(&mut model.session.document).captures {
+        capture.base_from_tip = None;
+    }
+    model
+}
+
 /// What is to be reached.
 const FINDINGS: FindingOptions = FindingOptions::with_goal_mm(Some(0.5));
 

@@ -45,13 +45,27 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some(solved) = &model.solve.solved else {
         let count = model.document().in_use().count();
-        let detail = text!(
-            "A calibration takes at least three captures of the board, ten are good. Captures so far: {count}. It is solved automatically as soon as there are enough.",
-            count = count
-        );
+        let has_robot = model.document().mode().is_some();
+        let detail = if has_robot {
+            text!(
+                "A calibration takes at least three captures of the board, ten are good. Captures so far: {count}. It is solved automatically as soon as there are enough.",
+                count = count
+            )
+        } else {
+            text!(
+                "A calibration of the camera takes at least three images of the board in use, now {count}.",
+                count = count
+            )
+        };
         parts::empty_ui(ui, tr!(language, "No calibration yet"), &detail.say(language));
         ui.vertical_centered(|ui| {
-            let reason = (count < MIN_VIEWS).then(|| tr!(language, "Capture the board from more poses first"));
+            let reason = (count < MIN_VIEWS).then(|| {
+                if has_robot {
+                    tr!(language, "Capture the board from more poses first")
+                } else {
+                    tr!(language, "Use more of the images")
+                }
+            });
             if parts::gated_ui(ui, reason, Button::new(tr!(language, "Solve"))).clicked() {
                 outbox.send(Command::Solve);
             }

@@ -10,6 +10,7 @@ use handeye_core::progress::{CancelToken, Stage};
 use handeye_core::project::result::TruthComparison;
 use handeye_core::targets::bent::BoardShape;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use super::*;
 use crate::command::Command;
@@ -62,6 +63,15 @@ fn a_camera_without_a_robot_has_no_error_of_a_tip() {
     for of_robot in ["Expected error (95 %)", "Not known", "Robot position"] {
         assert!(!pane.sees(of_robot), "{of_robot}");
     }
+}
+
+#[test]
+fn images_without_a_robot_are_not_asked_for_poses() {
+    let mut images = sample::images_alone();
+    Arc::make_mut(&mut images.session.document).captures.truncate(2);
+    let pane = driven(images);
+    assert!(pane.sees("at least three images of the board in use, now 2"));
+    assert!(!pane.is_enabled("Solve") && !pane.sees("poses"));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use egui::{Button, Ui};
 
 use super::immovable;
+use crate::capture::pane::needs_robot;
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
 use crate::model::{CapturePurpose, Model, PoseSequence, StopOutcome};
@@ -44,6 +45,7 @@ fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ),
             (None, tr!(language, "Move only"), tr!(language, "Visits every pose and captures nothing")),
         ] {
+            let reason = reason.or_else(|| purpose.and_then(|_| needs_robot(model)));
             if parts::gated_ui(ui, reason, Button::new(name)).on_hover_text(what).clicked() {
                 outbox.send(Command::RunSequence { purpose });
             }

@@ -112,6 +112,16 @@ fn all_poses_are_run_for_each_purpose() {
 }
 
 #[test]
+fn a_session_of_images_is_moved_through_and_captures_nothing() {
+    let mut images = model();
+    let of_images = sample::images_alone();
+    Arc::make_mut(&mut images.session.document).captures.clone_from(&of_images.document().captures);
+    let mut pane = driven(images);
+    assert!(!pane.is_enabled("Capture at each") && !pane.is_enabled("Verify at each"));
+    assert_eq!(pane.click("Move only"), [Command::RunSequence { purpose: None }]);
+}
+
+#[test]
 fn a_sequence_says_how_each_pose_went_and_can_be_stopped() {
     let mut model = model();
     model.sequence_runs = true;
