@@ -13,7 +13,7 @@ use handeye_core::progress::CancelToken;
 use handeye_core::project::files::bounds::Bounds;
 use handeye_core::project::import::{self, Hypothesis, ImportError, Judgement, Recording, Settings, Verdict, write};
 use handeye_core::targets::TargetSpec;
-use handeye_core::wording::English;
+use handeye_core::wording::{English, Text};
 use serde_json::json;
 
 use super::output::Output;
@@ -156,7 +156,7 @@ impl Told {
                 "format": "handeye-import",
                 "version": 1,
                 "found": recording.beliefs,
-                "warnings": recording.warnings,
+                "warnings": in_english(&recording.warnings),
                 "notes": self.notes,
                 "judgement": findings,
             });
@@ -271,7 +271,10 @@ fn choose(judgement: &Judgement, take: Option<Take>) -> Result<(usize, bool), Fa
         )),
         (_, Verdict::Unexplained) => {
             let why = judgement.hypotheses.first().and_then(|best| best.contradictions.first());
-            let why = why.map_or("images and poses may not belong together, or the target may be a different one", String::as_str);
+            let why = why.map_or_else(
+                || "images and poses may not belong together, or the target may be a different one".to_owned(),
+                Text::to_string,
+            );
             nothing(format!("no hypothesis explains the recording: {why}; --take N takes one all the same"))
         }
     }
@@ -290,7 +293,7 @@ fn found(recording: &Recording) -> String {
         text.extend(["  ", belief, "\n"]);
     }
     for warning in &recording.warnings {
-        text.extend(["  note: ", warning, "\n"]);
+        text.extend(["  note: ", &warning.say(English), "\n"]);
     }
     text
 }
@@ -411,6 +414,10 @@ fn quoted(word: &str) -> String {
     }
 }
 
+fn in_english(said: &[Text]) -> Vec<String> {
+    said.iter().map(|text| text.say(English)).collect()
+}
+
 fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
     let one = |(number, h): (usize, &Hypothesis)| {
         let conventions: BTreeMap<&str, String> =
@@ -424,7 +431,7 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
                 "camera_mm": fit.camera_at_m * 1e3,
                 "target_mm": fit.target_at_m * 1e3,
                 "disagreeing": fit.disagreeing.iter().map(|(sample, misfit_m)| {
-                    json!({ "pose": samples[*sample].place, "mm": misfit_m * 1e3 })
+                    json!({ "pose": samples[*sample].place.say(English), "mm": misfit_m * 1e3 })
                 }).collect::<Vec<_>>(),
             })
         });
@@ -433,7 +440,7 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
             "conventions": conventions,
             "fit": fit,
             "same_as": h.same_as,
-            "contradictions": h.contradictions,
+            "contradictions": in_english(&h.contradictions),
         })
     };
     let verdict = match &judgement.verdict {

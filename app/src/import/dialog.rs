@@ -11,6 +11,7 @@ use egui::{
 };
 use handeye_core::image::RgbImage;
 use handeye_core::project::import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
+use handeye_core::wording::Value;
 
 use super::understand;
 use crate::command::{Command, Outbox};
@@ -61,7 +62,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     let cameras = recording
         .cameras
         .iter()
-        .map(|camera| text!("A camera in {file}: {why}", file = &camera.name, why = &camera.why));
+        .map(|camera| text!("A camera in {file}: {why}", file = &camera.name, why = Value::phrase(camera.why)));
     let targets = recording
         .targets
         .iter()
@@ -87,7 +88,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
         }
     }
     for warning in &recording.warnings {
-        parts::hint_ui(ui, warning);
+        parts::hint_ui(ui, &warning.say(language));
     }
 }
 
@@ -327,7 +328,7 @@ fn list_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language,
             );
             parts::hint_ui(ui, &line.say(language));
             for why in &h.contradictions {
-                parts::hint_ui(ui, why);
+                parts::hint_ui(ui, &why.say(language));
             }
         }
     }

@@ -1,13 +1,15 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use egui::Ui;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
 use handeye_core::estimate::handeye::Mode;
+use handeye_core::progress::CancelToken;
 use handeye_core::project::import::{
-    AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording, Role as TrackRole,
-    RotationForm, Sample, Settings, Stated,
+    self, AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording, Role as TrackRole,
+    RotationForm, Sample, Settings, Sights, Stated,
 };
+use nalgebra::{Isometry3, Vector3};
 
 use super::*;
 use crate::gui::testing::driven::Driven;
@@ -19,7 +21,7 @@ fn shown_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     import_ui(ui, model, outbox);
 }
 
-fn hypothesis(mode: Mode, direction: Direction, contradictions: &[&str]) -> Hypothesis {
+fn hypothesis(mode: Mode, direction: Direction, contradictions: &[Text]) -> Hypothesis {
     let reading = Reading { length: LengthUnit::Metre, angle: AngleUnit::Radian, rotation: RotationForm::Xyzw };
     let image_of = (0..4).map(Some).collect();
     Hypothesis {
@@ -40,7 +42,7 @@ fn hypothesis(mode: Mode, direction: Direction, contradictions: &[&str]) -> Hypo
             target_at_m: 0.5,
         }),
         same_as: Vec::new(),
-        contradictions: contradictions.iter().map(|why| (*why).to_owned()).collect(),
+        contradictions: contradictions.to_vec(),
     }
 }
 
@@ -48,7 +50,7 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
     let sample = |k: usize| Sample {
         image: None,
         number: None,
-        place: format!("poses.txt, row {}", k + 1),
+        place: Arc::new(text!("{file}, row {row}", file = "poses.txt", row = k + 1)),
         numbers: Numbers::Quaternion([0.4, 0.1 * k as f64, 0.3, 0.0, 0.0, 0.0, 1.0]),
         joints: Vec::new(),
     };
@@ -76,10 +78,13 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
         root: "/data/tuesday".into(),
         streams: vec![stream],
         tracks: vec![track],
-        warnings: vec!["image7.png is a copy of image3.png, byte by byte".into()],
+        warnings: vec![Text::verbatim("image7.png is a copy of image3.png, byte by byte")],
         ..Recording::default()
     };
-    let judgement = Judgement { hypotheses, tried: 912, untried: 0, sources_untried: 0, distance_m: 0.4, verdict };
+    found_in(recording, Judgement { hypotheses, tried: 912, untried: 0, sources_untried: 0, distance_m: 0.4, verdict })
+}
+
+fn found_in(recording: Recording, judgement: Judgement) -> Found {
     let recording = Arc::new(recording);
     Found {
         opened: Arc::clone(&recording),
@@ -160,13 +165,67 @@ fn what_is_known_is_fixed_and_given_back_to_the_data() {
 
 #[test]
 fn a_recording_that_is_contradicted_or_not_read_says_why() {
-    let wrong = hypothesis(Mode::EyeInHand, Direction::Forward, &["image2.png fits the pose of poses.txt, row 3"]);
+    let why = Text::verbatim("image2.png fits the pose of poses.txt, row 3");
+    let wrong = hypothesis(Mode::EyeInHand, Direction::Forward, &[why]);
     let mut pane = driven(Some(found(vec![wrong], Verdict::Unexplained)), Some(0));
     assert!(pane.sees("None of 912 explains the recording"));
     assert!(pane.sees("image2.png fits the pose of poses.txt, row 3"));
     pane.model().import.as_deref_mut().expect("open").trouble = Some(Text::verbatim("poses.txt: cannot be read"));
     pane.steps();
     assert!(pane.sees("poses.txt: cannot be read"));
+}
+
+/// An image that was copied, and two poses of the target that were exchanged.
+fn spoilt(folder: &Path) {
+    const VIEWS: usize = 12;
+    for (k, shade) in [10, 20, 30, 10].into_iter().enumerate() {
+        let image = RgbImage::from_pixel(8, 6, handeye_core::image::Rgb([shade; 3]));
+        image.save(folder.join(format!("image{k}.png"))).expect("written");
+    }
+    let base_from_tip = |k: usize| {
+        let of = |rate: f64, phase: f64| (rate * k as f64 + phase).sin();
+        let at = Vector3::new(0.4 + 0.1 * of(0.7, 0.0), 0.1 * of(1.1, 1.0), 0.5 + 0.1 * of(1.7, 2.0));
+        Isometry3::new(at, 0.5 * Vector3::new(of(1.3, 0.5), of(0.9, 2.0), of(2.1, 1.0)))
+    };
+    let tip_from_camera = Isometry3::new(Vector3::new(0.03, -0.05, 0.08), Vector3::new(0.2, -0.3, 1.5));
+    let base_from_target = Isometry3::new(Vector3::new(0.9, 0.1, 0.1), Vector3::new(1.0, 2.0, 0.5));
+    let camera_from_target = |k: usize| (base_from_tip(k) * tip_from_camera).inverse() * base_from_target;
+    let mut order: Vec<usize> = (0..VIEWS).collect();
+    order.swap(2, 8);
+    let row = |pose: Isometry3<f64>| {
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        format!("{} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+    };
+    let put = |name: &str, rows: Vec<String>| std::fs::write(folder.join(name), rows.concat()).expect("written");
+    put("poses.txt", (0..VIEWS).map(|k| row(base_from_tip(k))).collect());
+    put("target_poses.txt", order.iter().map(|k| row(camera_from_target(*k))).collect());
+}
+
+#[test]
+fn what_is_wrong_with_a_recording_is_said_in_chinese_to_its_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    spoilt(folder.path());
+    let recording = import::open(folder.path()).expect("a recording");
+    let mut settings = Settings::default();
+    for known in ["mode=eye_in_hand", "pose=base_from_tip", "length_unit=m", "poses=poses.txt"] {
+        settings.set(known).expect("a choice");
+    }
+    let judgement =
+        import::judge(&recording, &Sights::default(), &settings, &CancelToken::default()).expect("hypotheses");
+    let chosen = judgement.hypotheses.iter().position(|h| !h.contradictions.is_empty()).expect("one is contradicted");
+    let [warnings, contradictions] = [&recording.warnings, &judgement.hypotheses[chosen].contradictions]
+        .map(|said| said.iter().map(|text| text.say(Language::Chinese)).collect::<Vec<_>>());
+    let mut pane = driven(Some(found_in(recording, judgement)), Some(chosen));
+    pane.model().view.language = Language::Chinese;
+    pane.steps();
+    assert!(!warnings.is_empty() && !contradictions.is_empty());
+    for said in warnings.iter().chain(&contradictions) {
+        assert!(pane.sees(said), "{said}");
+        let names = ["image3.png", "image0.png", "target_poses.txt", "poses.txt", "mm"];
+        let words = names.iter().fold(said.clone(), |words, name| words.replace(name, ""));
+        assert!(!words.contains(|letter: char| letter.is_ascii_alphabetic()), "{said}");
+    }
+    assert!(contradictions[0].contains("poses.txt，第 3 行"), "{contradictions:?}");
 }
 
 #[test]

@@ -264,7 +264,7 @@ impl Look<'_> {
             Err(why) => return Ok(Err(trouble(why.into()))),
         };
         let (camera, note) = import::chosen_camera(self.recording, size, self.settings)?;
-        self.notes.extend(note.map(Text::verbatim));
+        self.notes.extend(note);
         let known = camera.as_ref().map_or(CameraKnowledge::NOTHING, |c| CameraKnowledge::Fixed(c.intrinsics));
         let sight = if let Some(points) = &stream.points {
             self.seen.push((stream.name.clone(), points.iter().flatten().count(), points.len()));

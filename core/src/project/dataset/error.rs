@@ -227,7 +227,7 @@ pub enum DatasetProblem {
         /// Its name in the table.
         name: String,
         /// What is wrong with it.
-        source: ImageFileError,
+        source: Box<ImageFileError>,
     },
     /// Not the size of the others.
     #[error("image {name:?} is {got} px, but {others} {need} px: a data set is of one camera", got = size(*got), need = size(*need))]

@@ -65,8 +65,9 @@ pub(super) fn look_at(entries: &EntryList<'_>, may_be_absent: bool) -> Result<Ve
             sizes.push(None);
             continue;
         }
-        let size = image_file::image_size(&path)
-            .map_err(|source| entries.fail(view, DatasetProblem::BadImage { name: shown(&view.name), source }))?;
+        let size = image_file::image_size(&path).map_err(|source| {
+            entries.fail(view, DatasetProblem::BadImage { name: shown(&view.name), source: Box::new(source) })
+        })?;
         sizes.push(Some(size));
     }
     Ok(sizes)

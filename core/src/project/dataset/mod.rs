@@ -213,7 +213,7 @@ impl Dataset {
         let fail = |problem| DatasetError::new(file, entry.row, problem);
         let name = || error::shown(&entry.name);
         let path = entry.image_path.as_ref().ok_or_else(|| fail(DatasetProblem::MissingImage(name())))?;
-        loader(path).map_err(|source| fail(DatasetProblem::BadImage { name: name(), source }))
+        loader(path).map_err(|source| fail(DatasetProblem::BadImage { name: name(), source: Box::new(source) }))
     }
 
     /// SHA-256 of the input in hexadecimal: of the text that
@@ -230,7 +230,7 @@ impl Dataset {
         for entry in &self.entries {
             let Some(path) = &entry.image_path else { continue };
             let name = path.strip_prefix(&self.folder).unwrap_or(path).display().to_string();
-            let unreadable = |e| ImageFileError::Unreadable(image_file::one_line(&e));
+            let unreadable = |e| ImageFileError::Unreadable(image_file::foreign(&e));
             self.load(entry, |path| listing.add_file(&name, path).map_err(unreadable))?;
         }
         Ok(listing.digest())

@@ -9,6 +9,9 @@ use std::path::Path;
 
 use image::{DynamicImage, GrayImage, ImageError, ImageFormat, ImageReader, Limits, RgbImage};
 
+use crate::text;
+use crate::wording::Text;
+
 /// Most pixels of an image: more than machine-vision sensors have, and 300 MB as RGB.
 pub const MAX_PIXELS: u64 = 100_000_000;
 /// Most bytes that decoding may take: 16-bit RGBA of the largest image.
@@ -22,16 +25,16 @@ const MAX_FILE_BYTES: u64 = MAX_DECODED_BYTES;
 pub enum ImageFileError {
     /// Not there, not a file, or not permitted.
     #[error("the image cannot be opened: {0}")]
-    Unreadable(String),
+    Unreadable(Text),
     /// No image in a format that is read here, or a damaged one.
     #[error("the image cannot be decoded (PNG, JPEG, BMP and TIFF are read): {0}")]
-    Undecodable(String),
+    Undecodable(Text),
     /// The file ends before the image does.
     #[error("the image file is truncated: {0}; copy it again from its source")]
-    Truncated(String),
+    Truncated(Text),
     /// More pixels or bytes than any camera delivers.
     #[error("the image is too large: {0} (at most {MAX_PIXELS} pixels)")]
-    TooLarge(String),
+    TooLarge(Text),
 }
 
 /// Width and height in pixels from the header of an image file; the pixels are not decoded.
@@ -42,7 +45,7 @@ pub fn image_size(path: &Path) -> Result<(u32, u32), ImageFileError> {
     check_file(path)?;
     let reader = ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
-        .map_err(|e| ImageFileError::Unreadable(one_line(&e)))?;
+        .map_err(|e| ImageFileError::Unreadable(foreign(&e)))?;
     let size = reader.into_dimensions().map_err(decode_error)?;
     check_size(size)?;
     Ok(size)
@@ -85,14 +88,14 @@ pub fn gray_from_rgb(rgb: &RgbImage) -> GrayImage {
 
 fn decode(path: &Path) -> Result<DynamicImage, ImageFileError> {
     check_file(path)?;
-    let bytes = fs::read(path).map_err(|e| ImageFileError::Unreadable(one_line(&e)))?;
+    let bytes = fs::read(path).map_err(|e| ImageFileError::Unreadable(foreign(&e)))?;
     decode_bytes(&bytes)
 }
 
 /// The image of the bytes of a file.
 pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, ImageFileError> {
     let open = || {
-        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| ImageFileError::Unreadable(one_line(&e)))
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| ImageFileError::Unreadable(foreign(&e)))
     };
     let reader = open()?;
     let format = reader.format();
@@ -110,25 +113,26 @@ pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, ImageFileError>
 }
 
 fn check_file(path: &Path) -> Result<(), ImageFileError> {
-    let metadata = fs::metadata(path).map_err(|e| ImageFileError::Unreadable(one_line(&e)))?;
+    let metadata = fs::metadata(path).map_err(|e| ImageFileError::Unreadable(foreign(&e)))?;
     if !metadata.is_file() {
-        return Err(ImageFileError::Unreadable("it is not a file".into()));
+        return Err(ImageFileError::Unreadable(text!("it is not a file")));
     }
     if metadata.len() == 0 {
-        return Err(ImageFileError::Truncated("it is empty".into()));
+        return Err(ImageFileError::Truncated(text!("it is empty")));
     }
     if metadata.len() > MAX_FILE_BYTES {
-        return Err(ImageFileError::TooLarge(format!("{} bytes", metadata.len())));
+        return Err(ImageFileError::TooLarge(text!("{count} bytes", count = metadata.len())));
     }
     Ok(())
 }
 
 fn check_size((width, height): (u32, u32)) -> Result<(), ImageFileError> {
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(ImageFileError::TooLarge(format!("{width}×{height} px")));
+        return Err(ImageFileError::TooLarge(text!("{width}×{height} px", width = width, height = height)));
     }
     if width == 0 || height == 0 {
-        return Err(ImageFileError::Undecodable(format!("its size is {width}×{height} px")));
+        let size = text!("its size is {width}×{height} px", width = width, height = height);
+        return Err(ImageFileError::Undecodable(size));
     }
     Ok(())
 }
@@ -150,14 +154,14 @@ fn check_png_is_whole(bytes: &[u8]) -> Result<(), ImageFileError> {
         }
         at = end;
     }
-    Err(ImageFileError::Truncated("a PNG without its end chunk".into()))
+    Err(ImageFileError::Truncated(text!("a PNG without its end chunk")))
 }
 
 /// Walks the segments and scans of a JPEG to its end marker. The decoder fills what is missing with grey and is
 /// content, which would move corners without a word.
 fn check_jpeg_is_whole(bytes: &[u8]) -> Result<(), ImageFileError> {
     const END_OF_IMAGE: u8 = 0xD9;
-    let truncated = || ImageFileError::Truncated("a JPEG without its end marker".into());
+    let truncated = || ImageFileError::Truncated(text!("a JPEG without its end marker"));
     let mut at = 2;
     loop {
         let marker = next_jpeg_marker(bytes, &mut at).ok_or_else(truncated)?;
@@ -194,12 +198,17 @@ fn next_jpeg_marker(bytes: &[u8], at: &mut usize) -> Option<u8> {
 
 fn decode_error(error: ImageError) -> ImageFileError {
     match error {
-        ImageError::Limits(e) => ImageFileError::TooLarge(one_line(&e)),
+        ImageError::Limits(e) => ImageFileError::TooLarge(foreign(&e)),
         ImageError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            ImageFileError::Truncated(one_line(&e))
+            ImageFileError::Truncated(foreign(&e))
         }
-        other => ImageFileError::Undecodable(one_line(&other)),
+        other => ImageFileError::Undecodable(foreign(&other)),
     }
+}
+
+/// What another library says, on one line.
+pub(crate) fn foreign(error: &dyn std::fmt::Display) -> Text {
+    Text::verbatim(one_line(error))
 }
 
 /// Messages are one line, also where a library wrote more.

@@ -3,6 +3,8 @@
 use super::error::ImportError;
 use super::recording::{FoundCamera, Recording};
 use super::settings::Settings;
+use crate::text;
+use crate::wording::Text;
 
 /// The camera that is taken as known for images of this size, and what is to be said of those that are not.
 ///
@@ -14,7 +16,7 @@ pub fn chosen(
     recording: &Recording,
     size: (u32, u32),
     settings: &Settings,
-) -> Result<(Option<FoundCamera>, Option<String>), ImportError> {
+) -> Result<(Option<FoundCamera>, Option<Text>), ImportError> {
     let fits = |camera: &&FoundCamera| {
         let k = &camera.intrinsics;
         let same = (k.width, k.height) == size;
@@ -36,20 +38,26 @@ pub fn chosen(
         }
         let mut choices: Vec<&str> = fitting.iter().map(|camera| camera.name.as_str()).collect();
         choices.push("none");
-        let choices = format!("{} (of {}×{} px)", choices.join(", "), size.0, size.1);
+        let choices =
+            text!("{names} (of {width}×{height} px)", names = choices.join(", "), width = size.0, height = size.1);
         return Err(ImportError::BadChoice { key: "camera".into(), value: name.to_owned(), choices });
     }
     let differ = fitting.iter().any(|camera| camera.intrinsics != fitting[0].intrinsics);
     if differ {
         let names: Vec<&str> = fitting.iter().map(|camera| camera.name.as_str()).collect();
-        let note = format!("cameras in {}: none is taken, say which with --set camera=FILE", names.join(", "));
+        let note =
+            text!("cameras in {names}: none is taken, say which with --set camera=FILE", names = names.join(", "));
         return Ok((None, Some(note)));
     }
     if fitting.is_empty() && !recording.cameras.is_empty() {
         let camera = &recording.cameras[0];
         let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
-        let note =
-            format!("the camera in {} is of {width}×{height} px and not of these images: it is not used", camera.name);
+        let note = text!(
+            "the camera in {name} is of {width}×{height} px and not of these images: it is not used",
+            name = &camera.name,
+            width = width,
+            height = height
+        );
         return Ok((None, Some(note)));
     }
     Ok((fitting.into_iter().next(), None))

@@ -1,9 +1,10 @@
 //! Poses out of joint values, where a recording has no others and the chain of the arm is known.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::conventions::{Direction, LengthUnit, angles_for};
-use super::error::ImportError;
+use super::error::{ImportError, reasons};
 use super::formats::tree;
 use super::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
 use crate::geometry::arm::urdf::Urdf;
@@ -56,7 +57,7 @@ pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportErr
         }
     }
     if out.tracks.iter().all(|track| track.role == Role::Target) {
-        return Err(fail(Text::verbatim(troubles.join("; "))));
+        return Err(fail(reasons(troubles)));
     }
     out.beliefs.push(format!("poses are computed from joint values by the chain of {}", chain.name));
     out.warnings.extend(troubles);
@@ -101,7 +102,7 @@ impl Chain {
     }
 
     /// The poses that a series of joint values means, in every unit that they may have.
-    fn tracks(&self, series: &JointSeries) -> Result<Vec<Track>, String> {
+    fn tracks(&self, series: &JointSeries) -> Result<Vec<Track>, Text> {
         let order = self.order(series)?;
         let revolute = |i: usize| self.arm.joints()[i].kind == JointKind::Revolute;
         let angles = series.samples.iter().flat_map(|sample| {
@@ -126,7 +127,7 @@ impl Chain {
                 Some(Sample {
                     image: sample.image.clone(),
                     number: sample.number,
-                    place: sample.place.clone(),
+                    place: Arc::clone(&sample.place),
                     numbers: Numbers::Matrix(pose.matrix()),
                     joints: sample.values.clone(),
                 })
@@ -145,7 +146,7 @@ impl Chain {
             }
         }
         if tracks.is_empty() {
-            return Err(format!("{} has no three different configurations of its joints", series.name));
+            return Err(text!("{series} has no three different configurations of its joints", series = &series.name));
         }
         Ok(tracks)
     }
@@ -175,7 +176,7 @@ impl Chain {
     }
 
     /// For every joint of the chain its place among the values: by the names that stand with them, or as they come.
-    fn order(&self, series: &JointSeries) -> Result<Vec<usize>, String> {
+    fn order(&self, series: &JointSeries) -> Result<Vec<usize>, Text> {
         let count = self.arm.joint_count();
         let has = series.samples.first().map_or(0, |sample| sample.values.len());
         if series.joints.is_empty() {
@@ -186,7 +187,12 @@ impl Chain {
             return if has > count && has < 2 * count {
                 Ok((0..count).collect())
             } else {
-                Err(format!("{} has {has} joint values and the arm {count}", series.name))
+                Err(text!(
+                    "{series} has {has} joint values and the arm {count}",
+                    series = &series.name,
+                    has = has,
+                    count = count
+                ))
             };
         }
         // Drivers put what a robot is called before the names of its joints.
@@ -204,7 +210,12 @@ impl Chain {
         });
         found.ok_or_else(|| {
             let wanted = self.joint_names.last().map(|names| names.join(", ")).unwrap_or_default();
-            format!("{} has the joints {}, and the arm has {wanted}", series.name, series.joints.join(", "))
+            text!(
+                "{series} has the joints {joints}, and the arm has {wanted}",
+                series = &series.name,
+                joints = series.joints.join(", "),
+                wanted = wanted
+            )
         })
     }
 }

@@ -51,7 +51,7 @@ pub enum ImportError {
         /// How many poses a calibration needs.
         need: usize,
         /// What was found instead.
-        seen: String,
+        seen: Text,
     },
     /// The robot was at one place all the time.
     #[error(
@@ -108,11 +108,11 @@ pub enum ImportError {
         /// What was given.
         value: String,
         /// What may be given.
-        choices: String,
+        choices: Text,
     },
     /// What was chosen excludes everything.
     #[error("nothing is left to try with {0}: these choices exclude each other, or the recording does not have them")]
-    NothingLeft(String),
+    NothingLeft(&'static str),
     /// The folder to write is there and has something in it.
     #[error("{file}: is not empty: an import is written into a new folder, name another one", file = .0.display())]
     OutNotEmpty(PathBuf),
@@ -130,6 +130,12 @@ impl ImportError {
     pub(super) fn stopped(file: &Path, why: Spent) -> Self {
         Self::Stopped { file: file.to_path_buf(), why }
     }
+}
+
+/// Several reasons as one.
+pub(super) fn reasons(all: Vec<Text>) -> Text {
+    let joined = all.into_iter().reduce(|first, next| text!("{first}; {next}", first = first, next = next));
+    joined.unwrap_or_default()
 }
 
 /// What to do about it.

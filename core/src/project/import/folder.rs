@@ -12,6 +12,8 @@ use crate::natural_order;
 use crate::project::files::bounds::Bounds;
 use crate::project::files::image_file::{self, one_line};
 use crate::project::files::own_folder::DESCRIPTION;
+use crate::text;
+use crate::wording::Text;
 
 /// Most files that are looked at.
 const MAX_FILES: usize = 20_000;
@@ -36,7 +38,7 @@ pub(super) fn list(
     path: &Path,
     bounds: &Bounds,
     budget: &Budget<'_>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Text>,
 ) -> Result<(PathBuf, Vec<PathBuf>, Option<PathBuf>), ImportError> {
     let found = fs::metadata(path).map_err(|e| unreadable(path, &e))?;
     let (root, only) = if found.is_dir() {
@@ -50,8 +52,10 @@ pub(super) fn list(
     files.retain(|file| {
         let is_inside = bounds.has(&root.join(file));
         if !is_inside {
-            warnings
-                .push(format!("{} leads out of the folder that may be read from here and is not read", file.display()));
+            warnings.push(text!(
+                "{file} leads out of the folder that may be read from here and is not read",
+                file = file.display()
+            ));
         }
         is_inside
     });
@@ -180,7 +184,7 @@ pub(super) fn text(path: &Path) -> Result<String, ImportError> {
 }
 
 /// The streams of images in a list of files, the largest first, and what is odd about them; of a part where the budget is spent.
-pub(super) fn streams(root: &Path, files: &[PathBuf], budget: &Budget<'_>, warnings: &mut Vec<String>) -> Vec<Stream> {
+pub(super) fn streams(root: &Path, files: &[PathBuf], budget: &Budget<'_>, warnings: &mut Vec<Text>) -> Vec<Stream> {
     let images: Vec<PathBuf> = files.iter().filter(|file| is_image(file)).cloned().collect();
     let mut streams = Vec::new();
     let mut single: BTreeMap<PathBuf, Vec<(PathBuf, Option<u64>)>> = BTreeMap::new();
@@ -198,12 +202,10 @@ pub(super) fn streams(root: &Path, files: &[PathBuf], budget: &Budget<'_>, warni
         let has_stream = streams.iter().any(|s: &Stream| s.images[0].path.parent() == Some(folder.as_path()));
         if has_stream || members.len() < LEAST_IMAGES {
             let names: Vec<String> = members.iter().map(|(path, _)| path.display().to_string()).take(4).collect();
-            warnings.push(format!(
-                "{} {} no series and {} not used: {}",
-                members.len(),
-                if members.len() == 1 { "image is of" } else { "images are of" },
-                if members.len() == 1 { "is" } else { "are" },
-                names.join(", ")
+            warnings.push(text!(
+                "{count} {count|image is of no series and is|images are of no series and are} not used: {names}",
+                count = members.len(),
+                names = names.join(", ")
             ));
         } else {
             let members = members.into_iter().map(|(path, _)| (path, None)).collect();
@@ -239,7 +241,7 @@ fn take(
     members: Vec<(PathBuf, Option<u64>)>,
     budget: &Budget<'_>,
     streams: &mut Vec<Stream>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Text>,
 ) {
     let mut by_size: BTreeMap<((u32, u32), bool), Vec<ImageFile>> = BTreeMap::new();
     for (path, number) in members {
@@ -256,14 +258,19 @@ fn take(
                     stamp_ns: None,
                 });
             }
-            Err(why) => warnings.push(format!("{}: {why}", path.display())),
+            Err(why) => warnings.push(text!("{name}: {why}", name = path.display(), why = why)),
         }
     }
     let sizes = by_size.len();
     for ((size, is_depth), mut images) in by_size {
         images.sort_by(|a, b| natural_order::compare(&a.path.to_string_lossy(), &b.path.to_string_lossy()));
         if images.len() < LEAST_IMAGES {
-            warnings.push(format!("{} has another size ({}×{}) than the others", images[0].shown(), size.0, size.1));
+            warnings.push(text!(
+                "{image} has another size ({width}×{height}) than the others",
+                image = images[0].shown(),
+                width = size.0,
+                height = size.1
+            ));
             continue;
         }
         find_doubled(root, &mut images, budget, warnings);
@@ -286,7 +293,7 @@ fn is_sixteen_bits_of_grey(path: &Path) -> bool {
         .is_ok_and(|decoder| decoder.color_type() == image::ColorType::L16)
 }
 
-fn find_doubled(root: &Path, images: &mut [ImageFile], budget: &Budget<'_>, warnings: &mut Vec<String>) {
+fn find_doubled(root: &Path, images: &mut [ImageFile], budget: &Budget<'_>, warnings: &mut Vec<Text>) {
     use sha2::Digest as _;
     let mut by_length: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
     for (i, image) in images.iter().enumerate() {
@@ -307,7 +314,11 @@ fn find_doubled(root: &Path, images: &mut [ImageFile], budget: &Budget<'_>, warn
                 std::collections::btree_map::Entry::Occupied(first) => {
                     images[i].same_as = Some(*first.get());
                     let (copy, original) = (images[i].shown(), images[*first.get()].shown());
-                    warnings.push(format!("{copy} is a copy of {original}, byte by byte"));
+                    warnings.push(text!(
+                        "{copy} is a copy of {original}, byte by byte",
+                        copy = copy,
+                        original = original
+                    ));
                 }
             }
         }

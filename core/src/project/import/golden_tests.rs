@@ -12,6 +12,7 @@ use crate::progress::CancelToken;
 use crate::project::files::image_file;
 use crate::targets::{Charuco, Grid, TargetSpec};
 use crate::testing::data_folder;
+use crate::wording::Text;
 
 /// A recording, and what is known of it.
 struct Sample {
@@ -180,7 +181,8 @@ mod slow {
                     let of: Vec<String> =
                         h.conventions(&recording).iter().map(|c| format!("{}={}", c.key, c.value)).collect();
                     let fit = h.fit.as_ref().map_or(f64::NAN, |fit| fit.median_m * 1e3);
-                    format!("{fit:.2} mm {} {:?}", of.join(" "), h.contradictions)
+                    let why: Vec<String> = h.contradictions.iter().map(Text::to_string).collect();
+                    format!("{fit:.2} mm {} {why:?}", of.join(" "))
                 })
                 .collect();
             let what = format!("{:?} {:?}\n{}", sample.files, sample.settings, shown.join("\n"));

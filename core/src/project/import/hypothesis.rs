@@ -9,6 +9,7 @@ use super::pairing::Pairing;
 use super::recording::{Recording, Sample};
 use crate::estimate::handeye::Mode;
 use crate::geometry::frames::{Base, Pose, Tip};
+use crate::wording::Text;
 
 /// What the poses of the target come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +42,7 @@ pub struct Hypothesis {
     /// Other ways to say the same poses.
     pub same_as: Vec<String>,
     /// Why it cannot be right although most views agree: an image that fits the pose of another.
-    pub contradictions: Vec<String>,
+    pub contradictions: Vec<Text>,
 }
 
 /// How well the hand-eye equations hold.

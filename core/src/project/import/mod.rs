@@ -50,8 +50,8 @@ pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
 pub use pairing::Pairing;
 pub use recognise::{open, open_within};
 pub use recording::{
-    Clocks, FoundCamera, FoundTarget, ImageFile, JointSample, JointSeries, Known, Motion, Numbers, Recording, Role,
-    Sample, Stated, Stream, Track,
+    Clocks, FoundCamera, FoundMode, FoundTarget, ImageFile, JointSample, JointSeries, Known, Motion, Numbers,
+    Recording, Role, Sample, Stated, Stream, Track,
 };
 pub use settings::{KEYS, Settings};
 pub use sight::{Sight, size_of_points};

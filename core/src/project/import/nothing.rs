@@ -1,12 +1,14 @@
 //! What is said of a recording in which no series of poses was found: what its files have instead, and what to do.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::folder;
 use super::formats::{blocks, npz, table, tree, xml};
 use super::value::{self, Value};
 use crate::budget::Budget;
+use crate::text;
+use crate::wording::Text;
 
 /// Files of text that are told of.
 const MOST_TOLD: usize = 5;
@@ -15,19 +17,20 @@ const MOST_LOOKED_AT: usize = 200;
 const LARGEST: u64 = 1 << 20;
 
 /// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
-pub(super) fn reasons(root: &Path, files: &[PathBuf], budget: &Budget<'_>) -> Vec<String> {
-    let mut told: Vec<(Likely, String)> = Vec::new();
+pub(super) fn reasons(root: &Path, files: &[PathBuf], budget: &Budget<'_>) -> Vec<Text> {
+    let mut told: Vec<(Likely, Text)> = Vec::new();
     for members in folder::groups(files, true).iter().take(MOST_LOOKED_AT) {
         let Some((first, _)) = members.first().filter(|_| !budget.is_spent()) else { continue };
         let Some((likely, why)) = reason(&root.join(first), budget) else { continue };
         let shown = folder::shown(members.iter().map(|(file, _)| file.as_path()));
         let name = if members.len() == 1 { first.display().to_string() } else { shown };
-        told.push((likely, format!("{name} has {why}")));
+        told.push((likely, text!("{name} has {why}", name = name, why = why)));
     }
     told.sort_by_key(|(likely, _)| *likely);
-    let mut reasons: Vec<String> = told.into_iter().take(MOST_TOLD).map(|(_, why)| why).collect();
-    let not_read: BTreeSet<&str> = files.iter().filter_map(|file| not_read(file)).collect();
-    reasons.extend(not_read.into_iter().map(str::to_owned));
+    let mut reasons: Vec<Text> = told.into_iter().take(MOST_TOLD).map(|(_, why)| why).collect();
+    let not_read: BTreeMap<String, Text> =
+        files.iter().filter_map(|file| not_read(file)).map(|why| (why.to_string(), why)).collect();
+    reasons.extend(not_read.into_values());
     reasons
 }
 
@@ -40,27 +43,26 @@ enum Likely {
 }
 
 /// What to do with a file of a format that is not read.
-fn not_read(file: &Path) -> Option<&'static str> {
+fn not_read(file: &Path) -> Option<Text> {
     Some(match folder::ending(file).as_str() {
-        "mat" => "files of MATLAB (.mat) are not read: save the poses as csv, npz or json",
-        "pkl" | "pickle" => "pickles (.pkl) are not read, as reading one runs it: save the poses as csv, npz or json",
-        "xls" | "xlsx" | "ods" => "spreadsheets are not read: save the sheet as csv",
-        "zdf" => "files of Zivid (.zdf) are not read: save the images as png and the poses as csv",
-        "h5" | "hdf5" => "files of HDF5 (.h5) are not read: save the poses as csv, npz or json",
+        "mat" => text!("files of MATLAB (.mat) are not read: save the poses as csv, npz or json"),
+        "pkl" | "pickle" => {
+            text!("pickles (.pkl) are not read, as reading one runs it: save the poses as csv, npz or json")
+        }
+        "xls" | "xlsx" | "ods" => text!("spreadsheets are not read: save the sheet as csv"),
+        "zdf" => text!("files of Zivid (.zdf) are not read: save the images as png and the poses as csv"),
+        "h5" | "hdf5" => text!("files of HDF5 (.h5) are not read: save the poses as csv, npz or json"),
         _ => return None,
     })
 }
 
 /// What a file has in place of a series; `None` of one that is no text and no array.
-fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, String)> {
+fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, Text)> {
     let is_small = std::fs::metadata(file).is_ok_and(|found| found.len() <= LARGEST);
     let text = || folder::text(file).ok().filter(|_| is_small);
-    let of_document = |value: Result<Value, String>| match value {
+    let of_document = |value: Result<Value, Text>| match value {
         Ok(value) => document(&value),
-        Err(why) => {
-            let why = why.lines().next().unwrap_or_default().to_owned();
-            (Likely::Numbers, format!("something else than its name says: {why}"))
-        }
+        Err(why) => (Likely::Numbers, text!("something else than its name says: {why}", why = why)),
     };
     Some(match folder::ending(file).as_str() {
         "json" | "jsonl" | "samples" => of_document(value::json(&text()?)),
@@ -71,7 +73,7 @@ fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, String)> {
                 Some(value) => document(&value),
                 None => (
                     Likely::Neither,
-                    "nothing that is read as records: elements of one name with six numbers or more".to_owned(),
+                    text!("nothing that is read as records: elements of one name with six numbers or more"),
                 ),
             }
         }
@@ -83,35 +85,33 @@ fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, String)> {
     })
 }
 
-fn document(value: &Value) -> (Likely, String) {
+fn document(value: &Value) -> (Likely, Text) {
     match tree::fields(value).poses.len() {
-        0 => (Likely::Neither, "no fields that are poses".to_owned()),
-        1 => (Likely::Poses, "one pose, and three make a series".to_owned()),
-        many => (Likely::Poses, format!("{many} poses under different names, which are no series")),
+        0 => (Likely::Neither, text!("no fields that are poses")),
+        1 => (Likely::Poses, text!("one pose, and three make a series")),
+        many => (Likely::Poses, text!("{count} poses under different names, which are no series", count = many)),
     }
 }
 
-fn of_text(text: &str) -> (Likely, String) {
+fn of_text(text: &str) -> (Likely, Text) {
     let widths = table::widths(text);
     let Some((width, rows)) = widths.iter().max_by_key(|(_, rows)| **rows) else {
         let poses = blocks::document(text).map_or(0, |value| tree::fields(&value).poses.len());
         return if poses > 0 {
-            (Likely::Poses, format!("{poses} of the poses of which three make a series"))
+            (Likely::Poses, text!("{count} of the poses of which three make a series", count = poses))
         } else {
-            (Likely::Neither, "no rows of numbers".to_owned())
+            (Likely::Neither, text!("no rows of numbers"))
         };
     };
     let why = match (*rows, width) {
-        (1, _) => format!("one row of {width} numbers, and three make a series"),
-        (2, _) => format!("two rows of {width} numbers, and three make a series"),
-        (_, 5..=8) => {
-            format!(
-                "{rows} rows of {width} numbers that are no poses: if they are joint values, name the arm with arm=NAME"
-            )
-        }
-        _ => format!("{rows} rows of {width} numbers, of which poses are not made"),
+        (1, _) => text!("one row of {width} numbers, and three make a series"),
+        (2, _) => text!("two rows of {width} numbers, and three make a series"),
+        (_, 5..=8) => text!(
+            "{rows} rows of {width} numbers that are no poses: if they are joint values, name the arm with arm=NAME"
+        ),
+        _ => text!("{rows} rows of {width} numbers, of which poses are not made"),
     };
-    (Likely::Numbers, why)
+    (Likely::Numbers, why.with("rows", rows).with("width", width))
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ fn seen(folder: &Path, session: &Observations) -> Vec<Isometry3<f64>> {
 }
 
 fn is_refused(judgement: &Judgement) -> bool {
-    let said = |h: &Hypothesis| h.contradictions.iter().any(|why| why.contains("the camera's own poses"));
+    let said = |h: &Hypothesis| h.contradictions.iter().any(|why| why.to_string().contains("the camera's own poses"));
     judgement.verdict == Verdict::Unexplained && said(&judgement.hypotheses[0])
 }
 

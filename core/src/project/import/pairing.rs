@@ -116,7 +116,7 @@ fn by_name(samples: &[Sample], images: &[ImageFile]) -> Vec<Pairing> {
         out.push(Pairing::new("name", "by the names of images that stand with the poses", settled(samples, image_of)));
     }
     // A file of a pose and an image of the same name.
-    let of_file = |sample: &Sample| by_stem.get(&stem(Path::new(&sample.place))?).copied().flatten();
+    let of_file = |sample: &Sample| by_stem.get(&stem(Path::new(&sample.place.to_string()))?).copied().flatten();
     let image_of: Vec<_> = samples.iter().map(of_file).collect();
     if image_of.iter().any(Option::is_some) {
         out.push(Pairing::new("file", "by the names of files", settled(samples, image_of)));
@@ -237,9 +237,11 @@ pub(super) fn aligned(poses: usize, images: usize, leave_out: f64, cost: impl Fn
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
+    use std::sync::Arc;
 
     use super::*;
     use crate::project::import::recording::Numbers;
+    use crate::text;
 
     fn images(names: &[&str]) -> Vec<ImageFile> {
         let number = |name: &str| name.chars().filter(char::is_ascii_digit).collect::<String>().parse().ok();
@@ -253,7 +255,7 @@ mod tests {
         let row = |i: usize| Sample {
             image: None,
             number: None,
-            place: format!("poses.txt, row {}", i + 1),
+            place: Arc::new(text!("{file}, row {row}", file = "poses.txt", row = i + 1)),
             numbers: Numbers::Angles([i as f64, 0.0, 0.0, 0.0, 0.0, 0.0]),
             joints: Vec::new(),
         };

@@ -12,6 +12,8 @@ use crate::estimate::handeye::Mode;
 use crate::geometry::camera::Intrinsics;
 use crate::project::files::bounds::Bounds;
 use crate::targets::TargetSpec;
+use crate::text;
+use crate::wording::Text;
 
 /// A recording as it was found. Nothing of it is interpreted yet: numbers stand as they were written.
 #[derive(Debug, Clone, Default)]
@@ -45,11 +47,11 @@ pub struct Recording {
     /// Targets that files describe.
     pub targets: Vec<FoundTarget>,
     /// Where the camera sits, when a file says so, and which one.
-    pub mode: Option<Known<Mode>>,
+    pub mode: Option<FoundMode>,
     /// Where no series was found, what the files have instead, one sentence each.
-    pub nothing: Vec<String>,
+    pub nothing: Vec<Text>,
     /// What a person should know of the files: doubled ones, some that cannot be read.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Text>,
     /// Where images lie that were unpacked; they go with the recording.
     pub scratch: Vec<Arc<TempDir>>,
 }
@@ -144,8 +146,8 @@ pub struct Sample {
     pub image: Option<String>,
     /// Its number in the file, or the number of its file.
     pub number: Option<u64>,
-    /// Where it stands, for messages: file and row.
-    pub place: String,
+    /// Where it stands, for messages: file and row. A row that may be read in several ways has one for all of them.
+    pub place: Arc<Text>,
     /// The numbers.
     pub numbers: Numbers,
     /// Joint values that stand with it, in the unit of the file.
@@ -199,7 +201,7 @@ pub struct JointSample {
     /// Their number in the file, or the number of their file.
     pub number: Option<u64>,
     /// Where they stand, for messages.
-    pub place: String,
+    pub place: Arc<Text>,
     /// The values.
     pub values: Vec<f64>,
 }
@@ -246,6 +248,24 @@ impl<T> Known<T> {
     }
 }
 
+/// Where the camera sits, as a file says it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundMode {
+    /// It.
+    pub value: Mode,
+    /// By what the file says it.
+    pub key: &'static str,
+    /// The file.
+    pub file: String,
+}
+
+impl FoundMode {
+    /// Who says so.
+    pub fn why(&self) -> Text {
+        text!("{key} in {file}", key = self.key, file = &self.file)
+    }
+}
+
 /// A target that a file describes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundTarget {
@@ -265,5 +285,5 @@ pub struct FoundCamera {
     /// It. Width and height are 0 where the file does not say them.
     pub intrinsics: Intrinsics,
     /// What kind of file it is.
-    pub why: String,
+    pub why: &'static str,
 }

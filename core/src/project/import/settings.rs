@@ -3,6 +3,8 @@
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
 use crate::estimate::handeye::Mode;
+use crate::text;
+use crate::wording::Text;
 
 /// The keys of `--set` and their values, for `--help`.
 pub const KEYS: &str = "  mode=eye_in_hand|eye_to_hand
@@ -92,26 +94,26 @@ impl Settings {
     /// [`ImportError::BadChoice`] for a key or a value that is none.
     pub fn set(&mut self, assignment: &str) -> Result<(), ImportError> {
         let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
-        let bad = |choices: &str| ImportError::BadChoice {
-            key: key.to_owned(),
-            value: value.to_owned(),
-            choices: choices.to_owned(),
-        };
-        let length = || LengthUnit::ALL.into_iter().find(|unit| unit.name() == value).ok_or_else(|| bad("m, mm or cm"));
-        let angle = || AngleUnit::ALL.into_iter().find(|unit| unit.name() == value).ok_or_else(|| bad("rad or deg"));
+        let bad = |choices: Text| ImportError::BadChoice { key: key.to_owned(), value: value.to_owned(), choices };
+        let length =
+            || LengthUnit::ALL.into_iter().find(|unit| unit.name() == value).ok_or_else(|| bad(text!("m, mm or cm")));
+        let angle =
+            || AngleUnit::ALL.into_iter().find(|unit| unit.name() == value).ok_or_else(|| bad(text!("rad or deg")));
         let rotation = || {
             RotationForm::by_name(value).ok_or_else(|| {
-                bad("quaternion_xyzw, quaternion_wxyz, rotation_vector, matrix, rpy, kuka_abc, fanuc_wpr, euler_xyz, euler_XYZ \
-                     or euler_zyx_321")
+                bad(text!(
+                    "quaternion_xyzw, quaternion_wxyz, rotation_vector, matrix, rpy, kuka_abc, fanuc_wpr, euler_xyz, euler_XYZ \
+                     or euler_zyx_321"
+                ))
             })
         };
-        let text = || if value.is_empty() { Err(bad("a name")) } else { Ok(value.to_owned()) };
+        let text = || if value.is_empty() { Err(bad(text!("a name"))) } else { Ok(value.to_owned()) };
         match key {
             "mode" => {
                 self.mode = Some(match value {
                     "eye_in_hand" => Mode::EyeInHand,
                     "eye_to_hand" => Mode::EyeToHand,
-                    _ => return Err(bad("eye_in_hand or eye_to_hand")),
+                    _ => return Err(bad(text!("eye_in_hand or eye_to_hand"))),
                 });
             }
             "length_unit" => self.length = Some(length()?),
@@ -124,14 +126,14 @@ impl Settings {
                 self.direction = Some(match value {
                     "base_from_tip" => Direction::Forward,
                     "tip_from_base" => Direction::Inverse,
-                    _ => return Err(bad("base_from_tip or tip_from_base")),
+                    _ => return Err(bad(text!("base_from_tip or tip_from_base"))),
                 });
             }
             "target_pose" => {
                 self.target_direction = Some(match value {
                     "camera_from_target" => Direction::Forward,
                     "target_from_camera" => Direction::Inverse,
-                    _ => return Err(bad("camera_from_target or target_from_camera")),
+                    _ => return Err(bad(text!("camera_from_target or target_from_camera"))),
                 });
             }
             "pairing" => self.pairing = Some(text()?),
@@ -142,20 +144,21 @@ impl Settings {
             "image_size" => {
                 let side = |text: &str| text.trim().parse().ok().filter(|px: &u32| (1..100_000).contains(px));
                 let size = value.split_once(['x', 'X', '×']).and_then(|(width, height)| side(width).zip(side(height)));
-                self.image_size = Some(size.ok_or_else(|| bad("width and height in pixels, such as 640x480"))?);
+                self.image_size = Some(size.ok_or_else(|| bad(text!("width and height in pixels, such as 640x480")))?);
             }
             "clock_offset" => {
                 let seconds = value.parse().ok().filter(|seconds: &f64| seconds.is_finite());
-                self.clock_offset_s = Some(seconds.ok_or_else(|| bad("seconds, such as -12.5"))?);
+                self.clock_offset_s = Some(seconds.ok_or_else(|| bad(text!("seconds, such as -12.5")))?);
             }
             "arm" => self.arm = Some(text()?),
             _ => {
                 return Err(ImportError::BadChoice {
                     key: "a key of --set".into(),
                     value: key.to_owned(),
-                    choices: "mode, length_unit, angle_unit, rotation, pose, pairing, images, poses, target_poses, \
-                              target_pose, target_length_unit, target_rotation, camera, image_size, joint_unit, clock_offset or arm"
-                        .into(),
+                    choices: text!(
+                        "mode, length_unit, angle_unit, rotation, pose, pairing, images, poses, target_poses, target_pose, \
+                         target_length_unit, target_rotation, camera, image_size, joint_unit, clock_offset or arm"
+                    ),
                 });
             }
         }

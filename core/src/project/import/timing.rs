@@ -2,6 +2,7 @@
 //! the motion, and refused where that does not tell.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
@@ -17,6 +18,7 @@ use crate::estimate::clock_offset::{ClockOffset, ClockOffsetError, clock_offset,
 use crate::estimate::handeye::{Mode, PosePair, subset};
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::progress::CancelToken;
+use crate::text;
 
 /// Clocks of one bag that are set by the network are apart by less.
 const WITHIN_S: f64 = 2.0;
@@ -112,10 +114,11 @@ fn stood(recording: &Recording, out: &mut Recording, sights: &mut Sights, i: usi
     if tracks.is_empty() || kept.iter().filter(|image| sight.seen[**image].is_some()).count() < tree::LEAST_POSES {
         return false;
     }
-    out.warnings.push(format!(
-        "{refusal}. Of {} only the {} images at which the robot stood are used, which are few",
-        stream.name,
-        kept.len()
+    out.warnings.push(text!(
+        "{refusal}. Of {stream} only the {count} images at which the robot stood are used, which are few",
+        refusal = refusal,
+        stream = &stream.name,
+        count = kept.len()
     ));
     out.streams[i].images =
         kept.iter().map(|image| ImageFile { stamp_ns: None, ..stream.images[*image].clone() }).collect();
@@ -228,7 +231,11 @@ fn track(motion: &Motion, stream: &Stream, offset: &ClockOffset, chosen: &[usize
         Some(Sample {
             image: Some(image.shown()),
             number: None,
-            place: format!("{} at {:.4} s", motion.name, first_ns as f64 * 1e-9 + time_s),
+            place: Arc::new(text!(
+                "{name} at {seconds} s",
+                name = &motion.name,
+                seconds = format!("{:.4}", first_ns as f64 * 1e-9 + time_s)
+            )),
             numbers: Numbers::Quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w]),
             joints: Vec::new(),
         })

@@ -110,7 +110,7 @@ fn where_the_motion_tells_no_time_the_images_at_rest_are_kept() {
         Sample {
             image: Some(recording.streams[0].images[index].shown()),
             number: None,
-            place: format!("bag at rest {index}"),
+            place: Arc::new(text!("{name} at {seconds} s", name = "bag", seconds = index)),
             numbers: Numbers::Quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w]),
             joints: Vec::new(),
         }
@@ -121,7 +121,7 @@ fn where_the_motion_tells_no_time_the_images_at_rest_are_kept() {
     let out = timed(&recording, &mut sights, &Settings::default(), &CancelToken::default());
     let out = out.expect("rests are there").expect("stamps");
     assert!(out.clocks.is_empty() && out.tracks.len() == 1 && out.warnings.len() == 1, "{:?}", out.warnings);
-    assert!(out.warnings[0].contains("5 images at which the robot stood"), "{:?}", out.warnings);
+    assert!(out.warnings[0].to_string().contains("5 images at which the robot stood"), "{:?}", out.warnings);
     let names: Vec<String> = out.streams[0].images.iter().map(ImageFile::shown).collect();
     assert_eq!(names, rests.map(|index| recording.streams[0].images[index].shown()));
     assert_eq!(sights.streams[0].as_ref().expect("seen").seen.len(), rests.len());

@@ -7,6 +7,10 @@ use saphyr_parser::{Event, Parser, ScalarStyle};
 use serde::Deserialize;
 use serde::de::{self, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
+use crate::project::files::image_file::foreign;
+use crate::text;
+use crate::wording::Text;
+
 /// Deepest nesting that is read; recordings have four or five levels.
 const MAX_DEPTH: usize = 32;
 /// Most values in one file: ten thousand poses as 4×4 matrices.
@@ -103,19 +107,29 @@ fn collect(value: &Value, most: usize, numbers: &mut Vec<f64>) -> Option<()> {
 }
 
 /// Reads JSON; several values one after the other, as a line to a record, are a list.
-pub(super) fn json(text: &str) -> Result<Value, String> {
+pub(super) fn json(text: &str) -> Result<Value, Text> {
     let mut left = MAX_VALUES;
     let mut values = Vec::new();
     for record in serde_json::Deserializer::from_str(text).into_iter::<Record>() {
-        let Record { value, count } = record.map_err(|e| e.to_string())?;
+        let Record { value, count } = record.map_err(|e| refused(&e))?;
         left = left.checked_sub(count).ok_or_else(too_many)?;
         values.push(value);
     }
     match values.len() {
-        0 => Err("is empty".into()),
+        0 => Err(text!("is empty")),
         1 => Ok(values.swap_remove(0)),
         _ => Ok(Value::List(values)),
     }
+}
+
+/// Why serde reads no further. What is ours of it comes back with its place.
+fn refused(error: &serde_json::Error) -> Text {
+    let said = error.to_string();
+    let ours = [too_many(), too_deep()].into_iter().find(|why| said.starts_with(&why.to_string()));
+    ours.filter(|_| error.line() > 0).map_or_else(
+        || foreign(error),
+        |why| text!("{why} at line {line} column {column}", why = why, line = error.line(), column = error.column()),
+    )
 }
 
 /// A document of XML, within bounds: its parser compares every attribute of an element with all others of it, and keeps the names
@@ -255,17 +269,17 @@ impl<'de> Visitor<'de> for Json<'_> {
     }
 }
 
-fn too_many() -> String {
-    format!("has more than {MAX_VALUES} values")
+fn too_many() -> Text {
+    text!("has more than {most} values", most = MAX_VALUES)
 }
 
-fn too_deep() -> String {
-    format!("is nested more than {MAX_DEPTH} levels deep")
+fn too_deep() -> Text {
+    text!("is nested more than {most} levels deep", most = MAX_DEPTH)
 }
 
 /// Reads YAML: the documents of a file, one after the other. Tags are ignored; an alias stands for nothing, so that no
 /// file grows when it is read.
-pub(super) fn yaml(text: &str) -> Result<Vec<Value>, String> {
+pub(super) fn yaml(text: &str) -> Result<Vec<Value>, Text> {
     // OpenCV writes a first line that no version of YAML allows: `%YAML:1.0`.
     let text = match text.strip_prefix("%YAML:") {
         Some(rest) => rest.split_once('\n').map_or("", |(_, rest)| rest),
@@ -276,7 +290,7 @@ pub(super) fn yaml(text: &str) -> Result<Vec<Value>, String> {
     let mut open: Vec<Open> = Vec::new();
     let mut values = 0;
     while let Some(event) = parser.next_event() {
-        let (event, _) = event.map_err(|e| e.to_string())?;
+        let (event, _) = event.map_err(|e| foreign(&e))?;
         values += 1;
         if values > 2 * MAX_VALUES {
             return Err(too_many());
@@ -387,6 +401,8 @@ mod tests {
             assert!(yaml(&text).is_err(), "{} brackets", text.len());
             assert!(json(&text).is_err());
         }
+        let why = json(&"[".repeat(50)).expect_err("too deep").to_string();
+        assert_eq!(why, format!("is nested more than {MAX_DEPTH} levels deep at line 1 column {}", MAX_DEPTH + 1));
         let laughs = "a: &a [1, 1]\nb: &b [*a, *a]\nc: [*b, *b]\n";
         let documents = yaml(laughs).expect("read");
         assert_eq!(documents[0].get("c"), Some(&Value::List(vec![Value::Other, Value::Other])));
@@ -401,7 +417,7 @@ mod tests {
         assert!(xml(&spaces).is_err_and(|why| why.contains("spaces of names")));
         assert!(xml(&format!("<a>{}</a>", "<b/>".repeat(2 * MAX_VALUES))).is_err());
         for text in [format!("[{}1]", "1,".repeat(2 * MAX_VALUES)), "1 ".repeat(2 * MAX_VALUES)] {
-            assert!(json(&text).is_err_and(|why| why.contains("more than")), "{}", &text[..20]);
+            assert!(json(&text).is_err_and(|why| why.to_string().contains("more than")), "{}", &text[..20]);
         }
     }
 

@@ -263,7 +263,7 @@ const PLACEHOLDER: TargetSpec =
 fn image_name(recording: &Recording, source: Source, image: usize) -> String {
     match source {
         Source::Stream(i) => recording.streams[i].images[image].shown(),
-        Source::Track(i) => recording.tracks[i].samples[image].place.clone(),
+        Source::Track(i) => recording.tracks[i].samples[image].place.to_string(),
     }
 }
 
@@ -411,7 +411,7 @@ pub(super) fn stated(key: &str, h: &Hypothesis, recording: &Recording) -> Option
         Source::Stream(_) => None,
     };
     match key {
-        "mode" => recording.mode.as_ref().map(|k| k.why.clone()),
+        "mode" => recording.mode.as_ref().map(|found| found.why().to_string()),
         "pose" => robot
             .direction
             .as_ref()

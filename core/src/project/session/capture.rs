@@ -15,6 +15,8 @@ use crate::depth::DepthImage;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
+use crate::text;
+use crate::wording::Text;
 
 /// The folder of depth images in a session.
 pub(super) const DEPTH: &str = "depth";
@@ -78,17 +80,16 @@ impl<'a> Capture<'a> {
             pose_name: self.pose_name.map(str::to_owned),
         };
         record.check()?;
-        let refuse =
-            |what: &str| Err(EditError::Bad { at: format!("capture {id} ({})", record.image), what: what.to_owned() });
+        let refuse = |what: Text| Err(EditError::bad(record.named(), what));
         let size = self.image.dimensions();
         if size.0 == 0 || size.1 == 0 {
-            return refuse("has an image without pixels");
+            return refuse(text!("has an image without pixels"));
         }
         if session_size.is_some_and(|other| other != size) {
-            return refuse("has an image of another size than the captures before: begin a new session");
+            return refuse(text!("has an image of another size than the captures before: begin a new session"));
         }
         if self.depth_m.is_some_and(|d| (d.width, d.height) != size) {
-            return refuse("has a depth image of another size than its image");
+            return refuse(text!("has a depth image of another size than its image"));
         }
         Ok(record)
     }

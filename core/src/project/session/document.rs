@@ -13,10 +13,11 @@ use crate::geometry::arm::{ArmModel, JointKind, MAX_JOINTS};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::dataset::CameraInput;
-use crate::project::files::image_file::one_line;
 use crate::project::result::{CalibrationResult, TransformEstimate};
 use crate::project::taught_poses::{Goal, TaughtPose};
 use crate::targets::TargetSpec;
+use crate::text;
+use crate::wording::Text;
 
 /// The state of a session. It changes by [`super::Edit`] alone, see [`Document::apply`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -184,11 +185,11 @@ impl Document {
 
     /// Refuses a capture with a pose of the robot among others without one, and the reverse.
     pub(super) fn check_robot(&self, capture: &CaptureRecord) -> Result<(), EditError> {
-        let at = || format!("capture {} ({})", capture.id, capture.image);
+        let refuse = |what: Text| Err(EditError::bad(capture.named(), what));
         match (self.mode(), capture.base_from_tip) {
             _ if self.captures.is_empty() => Ok(()),
-            (Some(_), None) => Err(bad(at(), "has no pose of the robot, and the others have one: begin a new session")),
-            (None, Some(_)) => Err(bad(at(), "has a pose of the robot, and the others have none: begin a new session")),
+            (Some(_), None) => refuse(text!("has no pose of the robot, and the others have one: begin a new session")),
+            (None, Some(_)) => refuse(text!("has a pose of the robot, and the others have none: begin a new session")),
             (Some(_), Some(_)) | (None, None) => Ok(()),
         }
     }
@@ -205,7 +206,8 @@ impl Document {
                 return Err(EditError::UsedNumber(capture.id));
             }
             if self.captures[..i].iter().any(|other| other.image == capture.image) {
-                return Err(bad(format!("the image {:?}", capture.image), "is there twice"));
+                let at = text!("the image {image}", image = format!("{:?}", capture.image));
+                return Err(EditError::bad(at, text!("is there twice")));
             }
             self.check_robot(capture)?;
         }
@@ -216,19 +218,19 @@ impl Document {
 impl SessionMeta {
     /// Checks what the types do not say.
     pub(super) fn check(&self) -> Result<(), EditError> {
-        self.target.check().map_err(|why| bad("target", &format!("cannot be: {why}")))?;
-        if let Some(Err(e)) = self.arm.as_ref().map(ArmModel::arm) {
-            return Err(bad("arm", &format!("is of no use: {}", one_line(&e))));
+        self.target.check().map_err(|why| bad("target", text!("cannot be: {why}", why = why)))?;
+        if let Some(Err(why)) = self.arm.as_ref().map(ArmModel::arm) {
+            return Err(bad("arm", text!("is of no use: {why}", why = why)));
         }
         if self.joint_kinds.as_ref().is_some_and(|kinds| kinds.is_empty() || kinds.len() > MAX_JOINTS) {
-            return Err(bad("joint_kinds", "has no joints, or more than an arm has"));
+            return Err(bad("joint_kinds", text!("has no joints, or more than an arm has")));
         }
         let Some(camera) = &self.camera else { return Ok(()) };
         if camera.fixed && camera.intrinsics.is_none() {
-            return Err(bad("camera", "is fixed and has no intrinsics"));
+            return Err(bad("camera", text!("is fixed and has no intrinsics")));
         }
         match camera.intrinsics.map(|k| k.validate()) {
-            Some(Err(e)) => Err(bad("camera.intrinsics", &one_line(&e))),
+            Some(Err(why)) => Err(bad("camera.intrinsics", why.into())),
             _ => Ok(()),
         }
     }
@@ -245,26 +247,31 @@ impl CaptureRecord {
         std::iter::once(self.image.as_str()).chain(self.depth.as_deref())
     }
 
+    /// It in a sentence.
+    pub(super) fn named(&self) -> Text {
+        text!("capture {id} ({image})", id = self.id, image = &self.image)
+    }
+
     pub(super) fn check(&self) -> Result<(), EditError> {
-        let refuse = |what: &str| Err(bad(format!("capture {} ({})", self.id, self.image), what));
+        let refuse = |what: Text| Err(EditError::bad(self.named(), what));
         if self.id == CaptureId::none() {
-            return refuse("has no number: numbers begin at 1");
+            return refuse(text!("has no number: numbers begin at 1"));
         }
         if !self.files().all(stays_inside) {
-            return refuse("names a file that is not inside of the session");
+            return refuse(text!("names a file that is not inside of the session"));
         }
         if !self.base_from_tip.is_none_or(|pose| pose.is_finite()) {
-            return refuse("has a tip pose that is not finite");
+            return refuse(text!("has a tip pose that is not finite"));
         }
         let measured = [self.corner_noise_px, self.settled_s];
         if !measured.iter().flatten().all(|v| v.is_finite() && *v >= 0.0) {
-            return refuse("has a corner_noise_px or settled_s that is negative or not finite");
+            return refuse(text!("has a corner_noise_px or settled_s that is negative or not finite"));
         }
         if !self.joints_rad.iter().flatten().chain(&self.sim_time_s).all(|v| v.is_finite()) {
-            return refuse("has a joint angle or a time that is not finite");
+            return refuse(text!("has a joint angle or a time that is not finite"));
         }
         if self.frames == 0 {
-            return refuse("is the mean of no frames");
+            return refuse(text!("is the mean of no frames"));
         }
         Ok(())
     }
@@ -274,18 +281,21 @@ impl CaptureRecord {
 pub(super) fn check_taught(poses: &[TaughtPose]) -> Result<(), EditError> {
     for (i, pose) in poses.iter().enumerate() {
         let before = || poses[..i].iter().filter(|other| other.is_of(pose.cell.as_ref()));
-        let refuse = |what: &str| Err(bad(format!("taught pose {:?}", pose.name), what));
+        let refuse = |what: Text| {
+            let at = text!("taught pose {name}", name = format!("{:?}", pose.name));
+            Err(EditError::bad(at, what))
+        };
         if pose.name.trim().is_empty() {
-            return refuse("has an empty name");
+            return refuse(text!("has an empty name"));
         }
         if before().any(|other| other.name == pose.name) {
             return Err(EditError::SamePoseName(pose.name.clone()));
         }
         match &pose.goal {
-            Goal::Tip(base_from_tip) if !base_from_tip.is_finite() => return refuse("is not finite"),
-            Goal::Joints(joints) if !joints.iter().all(|v| v.is_finite()) => return refuse("is not finite"),
+            Goal::Tip(base_from_tip) if !base_from_tip.is_finite() => return refuse(text!("is not finite")),
+            Goal::Joints(joints) if !joints.iter().all(|v| v.is_finite()) => return refuse(text!("is not finite")),
             Goal::Joints(joints) if joints.is_empty() || before().any(|other| other.joints_differ(joints.len())) => {
-                return refuse("has another number of joint angles than the poses before, or none");
+                return refuse(text!("has another number of joint angles than the poses before, or none"));
             }
             Goal::Tip(_) | Goal::Joints(_) => {}
         }
@@ -298,6 +308,7 @@ fn stays_inside(name: &str) -> bool {
     !name.is_empty() && Path::new(name).components().all(|c| matches!(c, Component::Normal(_)))
 }
 
-fn bad(at: impl Into<String>, what: &str) -> EditError {
-    EditError::Bad { at: at.into(), what: what.to_owned() }
+/// A field of the document, which has one name in every language.
+fn bad(at: &str, what: Text) -> EditError {
+    EditError::bad(Text::verbatim(at), what)
 }

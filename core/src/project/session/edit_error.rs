@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::capture_id::CaptureId;
+use crate::wording::Text;
 
 /// What was done to the taught poses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,12 +51,13 @@ pub enum EditError {
     #[error("the taught poses do not show what was done to them ({0}): send all poses as they are afterwards")]
     TaughtChange(TaughtChange),
     /// A value that a session must not have.
-    #[error("{at}: {what}")]
+    #[error("{at}: {what}", at = &**at, what = &**what)]
     Bad {
+        // Boxed, as most functions of a session hand this error on.
         /// Which value.
-        at: String,
+        at: Box<Text>,
         /// What is wrong with it.
-        what: String,
+        what: Box<Text>,
     },
     /// The document already is as the change would make it; an undo step would show nothing.
     #[error("nothing changes: the session is like this already")]
@@ -66,4 +68,11 @@ pub enum EditError {
     /// The last thing done was not an undo.
     #[error("there is nothing to redo")]
     NothingToRedo,
+}
+
+impl EditError {
+    /// That a value is none of a session.
+    pub(super) fn bad(at: Text, what: Text) -> Self {
+        Self::Bad { at: Box::new(at), what: Box::new(what) }
+    }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::tree;
 use crate::estimate::handeye::Mode;
 use crate::project::import::conventions::{Direction, LengthUnit, RotationForm};
-use crate::project::import::recording::{Known, Role, Track};
+use crate::project::import::recording::{FoundMode, Known, Role, Track};
 use crate::project::import::value::Value;
 
 /// The series of a file of samples; `None` when it is none.
@@ -36,9 +36,9 @@ pub(in crate::project::import) fn samples(value: &Value, file: &str) -> Option<V
 }
 
 /// Where the camera sits by a `.calib` of easy_handeye2, or a result of easy_handeye.
-pub(in crate::project::import) fn mode(value: &Value, file: &Path) -> Option<Known<Mode>> {
+pub(in crate::project::import) fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
     let parameters = value.get("parameters")?;
-    let by = |key: &str, mode: Mode| Known::by(format!("{key} in {}", file.display()), mode);
+    let by = |key: &'static str, value: Mode| FoundMode { value, key, file: file.display().to_string() };
     if let Some(kind) = parameters.get("calibration_type").and_then(Value::text) {
         return match kind {
             "eye_in_hand" => Some(by("calibration_type", Mode::EyeInHand)),

@@ -2,13 +2,15 @@
 //! and the image in the other; images are rectified.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::tree;
 use crate::estimate::handeye::Mode;
 use crate::project::import::conventions::{Direction, LengthUnit};
-use crate::project::import::recording::{Known, Role, Sample, Track};
+use crate::project::import::recording::{FoundMode, Known, Role, Sample, Track};
 use crate::project::import::value::Value;
 use crate::targets::{Charuco, Dictionary, Grid, TargetSpec};
+use crate::text;
 
 /// Most pairs that are read.
 const MOST_PAIRS: usize = 10_000;
@@ -37,7 +39,9 @@ pub(in crate::project::import) fn pairs(
         let Some(document) = is_inside.then(|| read(&folder.join(name))).flatten() else { continue };
         let Some((_, numbers, stated)) = tree::fields(&document).poses.into_iter().next() else { continue };
         let image = folder.join(image).display().to_string();
-        let place = format!("{pose}, which {} pairs with {image}", file.display());
+        let place =
+            text!("{pose}, which {file} pairs with {image}", pose = pose, file = file.display(), image = &image);
+        let place = Arc::new(place);
         samples.push((Sample { image: Some(image), number: None, place, numbers, joints: Vec::new() }, stated));
     }
     if 2 * samples.len() < pairs {
@@ -53,9 +57,10 @@ pub(in crate::project::import) fn pairs(
 }
 
 /// Where the camera sits, where the file says it.
-pub(in crate::project::import) fn mode(value: &Value, file: &Path) -> Option<Known<Mode>> {
-    let mode = if value.get("static_camera")?.flag()? { Mode::EyeToHand } else { Mode::EyeInHand };
-    Some(Known::by(format!("static_camera in {}", file.display()), mode))
+pub(in crate::project::import) fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
+    let key = "static_camera";
+    let mode = if value.get(key)?.flag()? { Mode::EyeToHand } else { Mode::EyeInHand };
+    Some(FoundMode { value: mode, key, file: file.display().to_string() })
 }
 
 /// The target of its `target_finder`.

@@ -23,7 +23,7 @@ pub(in crate::project::import) fn of_document(value: &Value, file: &str) -> Vec<
 
 fn camera(
     file: &str,
-    why: &str,
+    why: &'static str,
     four: [f64; 4],
     size: Option<(u32, u32)>,
     distortion: Distortion,
@@ -34,7 +34,7 @@ fn camera(
     usable.then(|| FoundCamera {
         name: file.to_owned(),
         intrinsics: Intrinsics { width, height, fx, fy, cx, cy, distortion },
-        why: why.to_owned(),
+        why,
     })
 }
 

@@ -1,9 +1,13 @@
 //! Joint values without poses: MoveIt's joint states, lists and files of them. A chain makes poses of them.
 
+use std::sync::Arc;
+
 use super::tree::{self, LEAST_POSES};
 use crate::project::import::conventions::AngleUnit;
 use crate::project::import::recording::{JointSample, JointSeries, Known};
 use crate::project::import::value::Value;
+use crate::text;
+use crate::wording::Text;
 
 /// Joints of the largest robots that are calibrated.
 const MOST_JOINTS: usize = 64;
@@ -22,7 +26,7 @@ fn moveit(value: &Value, file: &str) -> Option<JointSeries> {
     let rows = value.get("joint_values")?.list();
     let samples = rows.iter().enumerate().filter_map(|(i, row)| {
         let values = row.numbers(MOST_JOINTS).filter(|values| values.len() == joints.len())?;
-        Some(sample(format!("{file}, joint state {}", i + 1), None, None, values))
+        Some(sample(text!("{file}, joint state {number}", file = file, number = i + 1), None, None, values))
     });
     let unit = Some(Known::by("MoveIt writes radians", AngleUnit::Radian));
     let samples = samples.collect();
@@ -50,7 +54,8 @@ fn listed(value: &Value, file: &str) -> Option<JointSeries> {
             _ if fields.poses.is_empty() && !fields.joints.is_empty() => fields.joints,
             _ => return None,
         };
-        Some(sample(format!("{file}, entry {}", i + 1), fields.image, fields.number, values))
+        let place = text!("{file}, entry {entry}", file = file, entry = i + 1);
+        Some(sample(place, fields.image, fields.number, values))
     });
     series(name, Vec::new(), None, samples.collect())
 }
@@ -58,7 +63,7 @@ fn listed(value: &Value, file: &str) -> Option<JointSeries> {
 /// Rows of numbers without names, each with its image, its number and where it stands, as joint values that they may be.
 pub(in crate::project::import) fn unnamed(
     name: &str,
-    rows: impl Iterator<Item = (Option<String>, Option<u64>, String, Vec<f64>)>,
+    rows: impl Iterator<Item = (Option<String>, Option<u64>, Text, Vec<f64>)>,
 ) -> Option<JointSeries> {
     let samples = rows.filter(|(.., numbers)| ROW.contains(&numbers.len()));
     series(
@@ -70,12 +75,12 @@ pub(in crate::project::import) fn unnamed(
 }
 
 pub(in crate::project::import) fn sample(
-    place: String,
+    place: Text,
     image: Option<String>,
     number: Option<u64>,
     values: Vec<f64>,
 ) -> JointSample {
-    JointSample { image, number, place, values }
+    JointSample { image, number, place: Arc::new(place), values }
 }
 
 /// A series of samples with as many values each; `None` when too few are left.

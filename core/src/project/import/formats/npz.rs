@@ -2,12 +2,16 @@
 //! one would run it.
 
 use std::io::{Cursor, Read as _};
+use std::sync::Arc;
 
 use super::parts::{self, Part};
 use super::tree;
 use crate::budget::Budget;
+use crate::project::files::image_file::foreign;
 use crate::project::import::recording::{Sample, Stated, Track};
 use crate::project::import::value::Value;
+use crate::text;
+use crate::wording::Text;
 
 /// Most arrays of a file, and most numbers of one.
 const MOST_ARRAYS: usize = 64;
@@ -32,7 +36,7 @@ pub(in crate::project::import) fn read(
     file: &str,
     bytes: &[u8],
     budget: &Budget<'_>,
-) -> Result<(Vec<Track>, Vec<String>), String> {
+) -> Result<(Vec<Track>, Vec<Text>), Text> {
     let (arrays, warnings) = arrays(file, bytes, budget)?;
     Ok((series(file, &arrays), warnings))
 }
@@ -59,22 +63,27 @@ pub(in crate::project::import) fn document(bytes: &[u8], budget: &Budget<'_>) ->
     }
 }
 
-fn arrays(file: &str, bytes: &[u8], budget: &Budget<'_>) -> Result<(Vec<Array>, Vec<String>), String> {
+fn arrays(file: &str, bytes: &[u8], budget: &Budget<'_>) -> Result<(Vec<Array>, Vec<Text>), Text> {
     let mut warnings = Vec::new();
     let mut arrays = Vec::new();
     if bytes.starts_with(b"PK") {
-        let mut zip = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| e.to_string())?;
+        let mut zip = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| foreign(&e))?;
         for i in 0..zip.len().min(MOST_ARRAYS) {
-            let entry = zip.by_index(i).map_err(|e| e.to_string())?;
+            let entry = zip.by_index(i).map_err(|e| foreign(&e))?;
             let name = entry.name().trim_end_matches(".npy").to_owned();
             let mut content = Vec::new();
             // What it unpacks to is not believed: no more is read than an array may have.
             let most = 16 * MOST_NUMBERS as u64;
-            let unpacked = entry.take(most).read_to_end(&mut content).map_err(|e| e.to_string())?;
-            budget.unpack(unpacked as u64).map_err(|e| e.to_string())?;
+            let unpacked = entry.take(most).read_to_end(&mut content).map_err(|e| foreign(&e))?;
+            budget.unpack(unpacked as u64)?;
             match array(&name, &content) {
                 Ok(array) => arrays.push(array),
-                Err(why) => warnings.push(format!("{file}: array {name:?} is not used: {why}")),
+                Err(why) => warnings.push(text!(
+                    "{file}: array {name} is not used: {why}",
+                    file = file,
+                    name = format!("{name:?}"),
+                    why = why
+                )),
             }
         }
     } else {
@@ -110,7 +119,8 @@ fn series(file: &str, arrays: &[Array]) -> Vec<Track> {
         let samples = rows.iter().enumerate().filter_map(|(i, row)| {
             let (numbers, said) = tree::of_numbers(row, &array.name)?;
             stated = said;
-            let place = format!("{file}, {} entry {}", array.name, i + 1);
+            let place = text!("{file}, {array} entry {entry}", file = file, array = &array.name, entry = i + 1);
+            let place = Arc::new(place);
             Some(Sample { image: named.map(|n| n[i].clone()), number: None, place, numbers, joints: Vec::new() })
         });
         let samples: Vec<Sample> = samples.collect();
@@ -122,9 +132,11 @@ fn series(file: &str, arrays: &[Array]) -> Vec<Track> {
 }
 
 /// Reads one array: the magic, a header that is a Python dictionary of three entries, the numbers.
-fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
-    let short = || "it ends early".to_owned();
-    let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("it is no array of NumPy")?;
+fn array(name: &str, bytes: &[u8]) -> Result<Array, Text> {
+    let short = || text!("it ends early");
+    let no_shape = || text!("its header has no shape");
+    let no_type = || text!("its type is not known");
+    let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or_else(|| text!("it is no array of NumPy"))?;
     let (&major, rest) = rest.split_first().ok_or_else(short)?;
     let rest = rest.get(1..).ok_or_else(short)?;
     let (length, rest) = if major == 1 {
@@ -139,25 +151,25 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, String> {
     let after =
         |key: &str| header.split_once(key).map(|(_, rest)| rest.trim_start().trim_start_matches(':').trim_start());
     let kind = after("'descr'").and_then(|rest| rest.strip_prefix('\'')).and_then(|rest| rest.split_once('\''));
-    let (kind, _) = kind.ok_or("its header has no simple type")?;
+    let (kind, _) = kind.ok_or_else(|| text!("its header has no simple type"))?;
     let fortran = after("'fortran_order'").is_some_and(|rest| rest.starts_with("True"));
     let shape = after("'shape'").and_then(|rest| rest.strip_prefix('(')).and_then(|rest| rest.split_once(')'));
-    let shape = shape.ok_or("its header has no shape")?.0;
+    let shape = shape.ok_or_else(no_shape)?.0;
     let shape: Vec<usize> = shape
         .split(',')
         .map(str::trim)
         .filter(|part| !part.is_empty())
-        .map(|part| part.parse().map_err(|_error| "its header has no shape".to_owned()))
+        .map(|part| part.parse().map_err(|_error| no_shape()))
         .collect::<Result<_, _>>()?;
     let count = shape.iter().try_fold(1usize, |product, n| product.checked_mul(*n)).filter(|n| *n <= MOST_NUMBERS);
-    let count = count.ok_or_else(|| format!("it has more than {MOST_NUMBERS} numbers"))?;
+    let count = count.ok_or_else(|| text!("it has more than {most} numbers", most = MOST_NUMBERS))?;
     if kind.contains('O') {
-        return Err("it holds Python objects, which are never unpickled; save it as numbers".into());
+        return Err(text!("it holds Python objects, which are never unpickled; save it as numbers"));
     }
-    let (order, kind) = kind.split_at_checked(1).ok_or("its type is not known")?;
+    let (order, kind) = kind.split_at_checked(1).ok_or_else(no_type)?;
     let is_big = order == ">";
-    let (letter, size) = kind.split_at_checked(1).ok_or("its type is not known")?;
-    let size: usize = size.parse().map_err(|_error| "its type is not known".to_owned())?;
+    let (letter, size) = kind.split_at_checked(1).ok_or_else(no_type)?;
+    let size: usize = size.parse().map_err(|_error| no_type())?;
     let content = if letter == "U" {
         Content::Texts(texts(data, count, size, is_big).ok_or_else(short)?)
     } else {
@@ -252,7 +264,7 @@ mod tests {
         bytes
     }
 
-    fn read_all(file: &str, bytes: &[u8]) -> Result<(Vec<Track>, Vec<String>), String> {
+    fn read_all(file: &str, bytes: &[u8]) -> Result<(Vec<Track>, Vec<Text>), Text> {
         let cancel = CancelToken::default();
         read(file, bytes, &Budget::new(Limits::default(), &|| Duration::ZERO, &cancel))
     }
@@ -270,7 +282,7 @@ mod tests {
     #[test]
     fn objects_are_never_unpickled() {
         let error = read_all("a.npy", &npy("|O", false, "3,", b"\x80\x04cos\nsystem\n")).expect_err("refused");
-        assert!(error.contains("never unpickled"), "{error}");
+        assert!(error.to_string().contains("never unpickled"), "{error}");
     }
 
     #[test]

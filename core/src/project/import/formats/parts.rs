@@ -1,5 +1,7 @@
 //! Series of which rotations and translations stand apart, as `calibrateHandEye` takes them.
 
+use std::sync::Arc;
+
 use nalgebra::Matrix3;
 
 use super::named::joined_numbers;
@@ -7,6 +9,7 @@ use super::tree::{LEAST_POSES, last_of, track, track_name};
 use crate::project::import::conventions::{RotationForm, is_rotation, rigid};
 use crate::project::import::recording::{Known, Sample, Stated, Track};
 use crate::project::import::value::Value;
+use crate::text;
 
 /// Lists of one document that are put together: each is compared with all others.
 const MOST_PARTS: usize = 256;
@@ -57,7 +60,7 @@ pub(in crate::project::import) fn series(parts: &[Part], file: &str) -> Vec<Trac
         let samples = rotations.rows.iter().zip(&translations.rows).enumerate().filter_map(|(i, (r, t))| {
             let &[x, y, z] = t.as_slice() else { return None };
             let numbers = joined_numbers([x, y, z], r)?;
-            let place = format!("{file}, entry {}", i + 1);
+            let place = Arc::new(text!("{file}, entry {entry}", file = file, entry = i + 1));
             Some(Sample { image: None, number: None, place, numbers, joints: Vec::new() })
         });
         let name = format!("{}+{}", rotations.name, translations.name);

@@ -1,10 +1,13 @@
 //! Poses in programs of robots, whose languages say what their numbers mean: URScript's `p[…]`, frames of KUKA's KRL, positions
 //! of FANUC and robtargets of ABB's RAPID.
 
+use std::sync::Arc;
+
 use super::tree;
 use crate::project::import::conventions::{AngleUnit, Euler, LengthUnit, RotationForm, is_unit};
 use crate::project::import::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::project::import::value::number;
+use crate::text;
 
 /// Poses of one file that are looked at.
 const MOST_POSES: usize = 100_000;
@@ -100,7 +103,7 @@ pub(in crate::project::import) fn read(file: &str, text: &str) -> Option<Track> 
             samples.push(Sample {
                 image: image_beside(text, at),
                 number: None,
-                place: format!("{file}, row {row}"),
+                place: Arc::new(text!("{file}, row {row}", file = file, row = row)),
                 numbers,
                 joints: Vec::new(),
             });
@@ -176,7 +179,7 @@ mod tests {
         let rows = (0..3).map(|i| format!("view_{i}.png, p[0.{i}, 0, 0, 0, 0, 0]")).collect::<Vec<_>>().join("\n");
         let track = read("poses.txt", &rows).expect("poses");
         assert_eq!(track.samples[2].image.as_deref(), Some("view_2.png"));
-        assert_eq!(track.samples[2].place, "poses.txt, row 3");
+        assert_eq!(track.samples[2].place.to_string(), "poses.txt, row 3");
         let lists = "[[600.0,1,700],[0.6,0,0.8,0]]\n".repeat(2) + "[[600.0,2,700],[0.6,0,0.8,0]]";
         assert!(
             read("poses.txt", &lists).is_none(),

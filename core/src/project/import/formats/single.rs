@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::table::bare::{self, Row};
 use crate::project::import::recording::{Role, Track};
 use crate::project::import::value::number;
+use crate::wording::Text;
 
 /// No pose with joint values beside it has as many numbers.
 pub(in crate::project::import) const MOST_NUMBERS: usize = 32;
@@ -28,7 +30,7 @@ pub(in crate::project::import) fn tracks<'a>(
 ) -> Vec<Track> {
     let all = files.len();
     let rows = files.filter_map(|(file, number, numbers)| {
-        Some(Row { image: None, number, place: file.display().to_string(), numbers: numbers? })
+        Some(Row { image: None, number, place: Arc::new(place(file)), numbers: numbers? })
     });
     let mut rows: Vec<Row> = rows.collect();
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
@@ -45,6 +47,12 @@ pub(in crate::project::import) fn tracks<'a>(
         track.role = role;
     }
     tracks
+}
+
+/// Where a pose stands that has a file for itself.
+pub(in crate::project::import) fn place(file: &Path) -> Text {
+    let name = file.display().to_string();
+    Text::verbatim(name)
 }
 
 /// The numbers of a text that has nothing else, whatever stands between them; brackets and calls of Python's are nothing.
@@ -76,7 +84,7 @@ mod tests {
         assert_eq!(plain.samples[1].numbers, Numbers::Angles([1.5, -20.0, 30.0, 400.0, -500.25, 600.0]));
         assert_eq!(turned.samples[1].numbers, Numbers::Angles([400.0, -500.25, 600.0, 1.5, -20.0, 30.0]));
         assert_eq!(turned.reading_of.as_deref(), Some("view#.txt"), "another reading of the same series");
-        assert_eq!((turned.samples[3].number, turned.samples[3].place.as_str()), (Some(3), "view3.txt"));
+        assert_eq!((turned.samples[3].number, turned.samples[3].place.to_string()), (Some(3), "view3.txt".to_owned()));
     }
 
     #[test]

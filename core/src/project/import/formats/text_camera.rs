@@ -58,7 +58,7 @@ pub(in crate::project::import) fn read(text: &str, file: &Path, root: &Path) -> 
     let size = runs.iter().find(|run| run.has(&["resolution", "size"]) && run.numbers.len() == 2);
     fields.extend(size.map(|run| ("image_size".to_owned(), list(&run.numbers))));
     let mut found = intrinsics::of_document(&Value::Map(fields), &file.display().to_string()).pop()?;
-    found.why = "a camera matrix in a text".into();
+    found.why = "a camera matrix in a text";
     Some(found)
 }
 

@@ -2,12 +2,15 @@
 //! a rotation beside a translation; in a list, under keys that count, or one to a file.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::named;
 use super::parts::{self, Part};
 use crate::project::import::conventions::{Euler, RotationForm, is_unit, rigid};
 use crate::project::import::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::project::import::value::Value;
+use crate::text;
+use crate::wording::Text;
 
 /// Poses that make a series.
 pub(in crate::project::import) const LEAST_POSES: usize = 3;
@@ -214,7 +217,8 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
         // Joint values are no poses, however many they are.
         Value::List(items) if is_about_joints(path) && items.iter().all(|item| item.numbers(12).is_some()) => {}
         Value::List(items) if value.numbers(16).is_none() && items.len() >= LEAST_POSES => {
-            let named = items.iter().enumerate().map(|(i, item)| (format!("{file}, entry {}", i + 1), None, item));
+            let place = |i: usize| text!("{file}, entry {entry}", file = file, entry = i + 1);
+            let named = items.iter().enumerate().map(|(i, item)| (place(i), None, item));
             let found = of_elements(path, file, named.collect());
             if found.iter().all(Track::is_still) {
                 parts.extend(Part::of(path, items));
@@ -248,7 +252,8 @@ fn look(value: &Value, path: &str, file: &str, tracks: &mut Vec<Track>, parts: &
                 members.sort_by_key(|(number, ..)| *number);
                 let path = joined(path, if prefix.is_empty() { "#" } else { &prefix });
                 if members.len() >= LEAST_POSES {
-                    let named = members.iter().map(|(n, key, item)| (format!("{file}, {key}"), Some(*n), *item));
+                    let place = |key: &str| text!("{file}, {key}", file = file, key = key);
+                    let named = members.iter().map(|(n, key, item)| (place(key), Some(*n), *item));
                     tracks.extend(of_elements(&path, file, named.collect()));
                 } else {
                     for (_, key, inner) in members {
@@ -277,16 +282,16 @@ fn counting_key(key: &str) -> Option<(String, u64)> {
     Some((prefix.trim_end_matches(['_', '-', ' ']).to_owned(), number.parse().ok()?))
 }
 
-fn of_elements(path: &str, file: &str, elements: Vec<(String, Option<u64>, &Value)>) -> Vec<Track> {
+fn of_elements(path: &str, file: &str, elements: Vec<(Text, Option<u64>, &Value)>) -> Vec<Track> {
     let mut by_path: BTreeMap<String, (Stated, Vec<Sample>)> = BTreeMap::new();
     let count = elements.len();
     for (place, number, element) in elements {
-        let found = fields(element);
+        let (place, found) = (Arc::new(place), fields(element));
         for (inner, numbers, stated) in found.poses {
             let sample = Sample {
                 image: found.image.clone(),
                 number: number.or(found.number),
-                place: place.clone(),
+                place: Arc::clone(&place),
                 numbers,
                 joints: found.joints.clone(),
             };

@@ -57,7 +57,7 @@ pub(in crate::project::import) fn camera(text: &str, file: &str) -> Option<Found
             cy: number("v0")?,
             distortion,
         },
-        why: "a camera of ViSP".into(),
+        why: "a camera of ViSP",
     })
 }
 

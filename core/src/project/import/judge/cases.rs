@@ -11,12 +11,14 @@ use crate::geometry::statistics::median;
 use crate::project::import::conventions::{
     AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm, angles_for, lengths_for,
 };
-use crate::project::import::error::ImportError;
+use crate::project::import::error::{ImportError, reasons};
 use crate::project::import::formats::tree::LEAST_POSES;
 use crate::project::import::hypothesis::{Hypothesis, Source};
 use crate::project::import::pairing::{Pairing, pairings};
 use crate::project::import::recording::{ImageFile, Numbers, Recording, Role, Sample, Stated, Track};
 use crate::project::import::settings::Settings;
+use crate::text;
+use crate::wording::Text;
 
 /// Targets are not seen from nearer or farther than this, metres.
 const NEAREST_M: f64 = 0.03;
@@ -81,7 +83,7 @@ pub(super) fn sources(
         Some(name) if !of.contains(&name.as_str()) => Err(ImportError::BadChoice {
             key: key.into(),
             value: name.clone(),
-            choices: if of.is_empty() { "there are none".into() } else { of.join(", ") },
+            choices: if of.is_empty() { text!("there are none") } else { Text::verbatim(of.join(", ")) },
         }),
         _ => Ok(()),
     };
@@ -165,31 +167,32 @@ pub(super) fn sources(
             });
         }
         if let Some(rule) = settings.pairing.as_ref().filter(|rule| !rules.contains(rule) && !rules.is_empty()) {
-            let choices = rules.join(", ");
+            let choices = Text::verbatim(rules.join(", "));
             return Err(ImportError::BadChoice { key: "pairing".into(), value: rule.clone(), choices });
         }
         let seen = if let Some(robot) = still {
-            format!(
-                "with {} there are not {LEAST_POSES} different poses of the robot and of the target",
-                recording.tracks[robot].name
+            text!(
+                "with {series} there are not {need} different poses of the robot and of the target",
+                series = &recording.tracks[robot].name,
+                need = LEAST_POSES
             )
         } else if let (true, Some(series)) =
             (recording.tracks.iter().all(|t| t.role == Role::Target), recording.joints.first())
         {
-            format!(
-                "{} has joint values alone: name the arm that they are of with arm=NAME, or its URDF file",
-                series.name
+            text!(
+                "{series} has joint values alone: name the arm that they are of with arm=NAME, or its URDF file",
+                series = &series.name
             )
         } else if recording.tracks.is_empty() && !recording.nothing.is_empty() {
-            recording.nothing.join("; ")
+            reasons(recording.nothing.clone())
         } else if recording.tracks.is_empty() {
-            "no file has poses of 6, 7, 12 or 16 numbers".to_owned()
+            text!("no file has poses of 6, 7, 12 or 16 numbers")
         } else if with_images {
-            "none of the series of poses has as many as images".to_owned()
+            text!("none of the series of poses has as many as images")
         } else {
-            format!(
-                "there are poses in {}, and neither images in which a target was found nor poses of a target beside them",
-                recording.tracks.iter().map(|t| t.name.as_str()).take(5).collect::<Vec<_>>().join(", ")
+            text!(
+                "there are poses in {series}, and neither images in which a target was found nor poses of a target beside them",
+                series = recording.tracks.iter().map(|t| t.name.as_str()).take(5).collect::<Vec<_>>().join(", ")
             )
         };
         let need = LEAST_POSES;

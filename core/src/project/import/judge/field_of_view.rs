@@ -4,24 +4,28 @@
 
 use nalgebra::Isometry3;
 
+use crate::text;
+use crate::wording::Text;
+
 /// Half of the field of lenses that calibrations are made with, radians: a fisheye of more sees a target at its border seldom.
 const HALF_FIELD_RAD: f64 = 70.0 * std::f64::consts::PI / 180.0;
 /// Of the views so many may be outside of it by a wrong row: a tenth, and one.
 const WRONG: usize = 10;
 
 /// That so many of the target's poses are outside of the field of every lens: beside the camera, or behind it.
-pub(super) fn outside(seen: &[Isometry3<f64>]) -> Option<String> {
+pub(super) fn outside(seen: &[Isometry3<f64>]) -> Option<Text> {
     let is_outside = |pose: &&Isometry3<f64>| {
         let at = pose.translation.vector;
         at.z < HALF_FIELD_RAD.cos() * at.norm()
     };
     let outside = seen.iter().filter(is_outside).count();
     (outside > (seen.len() / WRONG).max(1)).then(|| {
-        format!(
-            "in {outside} of {} views the poses that would be the target's put it behind the camera, or more than {:.0}° beside its \
-             axis, where no lens sees it",
-            seen.len(),
-            HALF_FIELD_RAD.to_degrees()
+        text!(
+            "in {outside} of {views} views the poses that would be the target's put it behind the camera, or more than {deg}° \
+             beside its axis, where no lens sees it",
+            outside = outside,
+            views = seen.len(),
+            deg = format!("{:.0}", HALF_FIELD_RAD.to_degrees())
         )
     })
 }

@@ -123,7 +123,7 @@ pub fn judge(
     let (paired, sources_untried) = cases::sources(recording, sights, settings)?;
     let (mut cases, mut untried) = cases::cases(recording, &paired, settings);
     if cases.is_empty() {
-        return Err(ImportError::NothingLeft("these settings".into()));
+        return Err(ImportError::NothingLeft("these settings"));
     }
     let (read, own) = (RefCell::default(), RefCell::default());
     let judge = Judge { recording, sights, paired: &paired, settings, cancel, read, own };

@@ -6,6 +6,7 @@
 use super::TIMES;
 use super::trial::Judge;
 use crate::project::import::hypothesis::{Hypothesis, Source};
+use crate::text;
 
 /// Factors that are looked at.
 const WIDEST: f64 = 5.0;
@@ -21,11 +22,12 @@ pub(super) fn contradict(judge: &Judge<'_>, hypotheses: &mut [Hypothesis]) {
     for h in hypotheses.iter_mut().filter(|h| h.explains() && matches!(h.source, Source::Stream(_))) {
         let Some((scale, misfit_m, own_m)) = found(judge, h) else { continue };
         if scale.ln().abs() > PRINTED.ln() && TIMES * misfit_m < own_m {
-            h.contradictions.push(format!(
-                "a target {scale:.3} times as large fits the robot's lengths, with {:.2} mm in the place of {:.2} mm{}",
-                misfit_m * 1e3,
-                own_m * 1e3,
-                judge.size_of_target(scale).map_or_else(String::new, |size| format!(": {size}"))
+            h.contradictions.push(text!(
+                "a target {scale} times as large fits the robot's lengths, with {mm} mm in the place of {own_mm} mm{size}",
+                scale = format!("{scale:.3}"),
+                mm = format!("{:.2}", misfit_m * 1e3),
+                own_mm = format!("{:.2}", own_m * 1e3),
+                size = judge.size_of_target(scale).map(|size| text!(": {size}", size = size)).unwrap_or_default()
             ));
         }
     }

@@ -26,6 +26,8 @@ use crate::project::import::recording::{Recording, Role};
 use crate::project::import::settings::Settings;
 use crate::project::import::sight::Sight;
 use crate::targets::{AprilGrid, AprilTag, TargetSpec};
+use crate::text;
+use crate::wording::{Text, Value};
 
 /// A view disagrees beyond so many times the median, and beyond this part of the distance.
 const DISAGREES: f64 = 5.0;
@@ -47,7 +49,7 @@ pub(super) struct Judge<'a> {
     /// Series of the target that were read already: many cases share them.
     pub read: RefCell<HashMap<(usize, Reading, Direction), Rc<Sight>>>,
     /// Series of which it was found that their poses are a camera's own, and why: no robot's for any other camera either.
-    pub own: RefCell<BTreeMap<usize, String>>,
+    pub own: RefCell<BTreeMap<usize, Text>>,
 }
 
 /// What the camera saw.
@@ -163,17 +165,18 @@ impl Judge<'_> {
     }
 
     /// What the size of the target would be called.
-    pub fn size_of_target(&self, scale: f64) -> Option<String> {
-        match self.sights.target? {
-            TargetSpec::Chessboard(grid) => Some(format!("squares of {:.2} mm", grid.square_m * scale * 1e3)),
-            TargetSpec::Charuco(board) => Some(format!("squares of {:.2} mm", board.square_m * scale * 1e3)),
+    pub fn size_of_target(&self, scale: f64) -> Option<Text> {
+        let mm = |length_m: f64| format!("{:.2}", length_m * scale * 1e3);
+        Some(match self.sights.target? {
+            TargetSpec::Chessboard(grid) => text!("squares of {mm} mm", mm = mm(grid.square_m)),
+            TargetSpec::Charuco(board) => text!("squares of {mm} mm", mm = mm(board.square_m)),
             TargetSpec::Circles(grid) | TargetSpec::AsymmetricCircles(grid) => {
-                Some(format!("dots {:.2} mm apart", grid.square_m * scale * 1e3))
+                text!("dots {mm} mm apart", mm = mm(grid.square_m))
             }
             TargetSpec::AprilGrid(AprilGrid { tag_m, .. }) | TargetSpec::AprilTag(AprilTag { tag_m, .. }) => {
-                Some(format!("tags of {:.2} mm", tag_m * scale * 1e3))
+                text!("tags of {mm} mm", mm = mm(tag_m))
             }
-        }
+        })
     }
 
     /// A case with all its views, under each of its names.
@@ -201,7 +204,7 @@ impl Judge<'_> {
         case.labels.iter().map(one).collect()
     }
 
-    fn fit(&self, case: &Case, pairing: &Pairing, sight: &Sight, solution: &ClosedFormSolution) -> (Fit, Vec<String>) {
+    fn fit(&self, case: &Case, pairing: &Pairing, sight: &Sight, solution: &ClosedFormSolution) -> (Fit, Vec<Text>) {
         let views = self.views(case, pairing, sight);
         let misfits: Vec<(f64, f64)> = views.iter().map(|v| misfit(sight, solution, &v.pair)).collect();
         let median_m = median(misfits.iter().map(|m| m.0)).unwrap_or(f64::INFINITY);
@@ -210,7 +213,7 @@ impl Judge<'_> {
         let mut disagreeing = Vec::new();
         let is_near = median_m < EXPLAINED * sight.distance_m && median_rad < EXPLAINED_RAD;
         let own = is_near.then(|| self.own_poses(case, sight, solution, &views)).flatten();
-        let mut contradictions: Vec<String> = own.into_iter().collect();
+        let mut contradictions: Vec<Text> = own.into_iter().collect();
         let agrees = |sample: usize| {
             views.iter().zip(&misfits).any(|(view, (misfit_m, _))| view.sample == sample && *misfit_m <= limit)
         };
@@ -227,18 +230,22 @@ impl Judge<'_> {
                 && !agrees(other)
             {
                 let samples = &self.recording.tracks[case.robot].samples;
-                contradictions.push(format!(
-                    "{} fits the pose of {} ({:.1} mm) and not that of {} ({:.1} mm)",
-                    self.image_name(case.source, view.image),
-                    samples[other].place,
-                    other_m * 1e3,
-                    samples[view.sample].place,
-                    misfit_m * 1e3
+                contradictions.push(text!(
+                    "{image} fits the pose of {other} ({other_mm} mm) and not that of {own} ({own_mm} mm)",
+                    image = self.image_name(case.source, view.image),
+                    other = &*samples[other].place,
+                    other_mm = format!("{:.1}", other_m * 1e3),
+                    own = &*samples[view.sample].place,
+                    own_mm = format!("{:.1}", misfit_m * 1e3)
                 ));
             }
         }
         if 3 * disagreeing.len() > views.len() {
-            contradictions.push(format!("{} of {} views disagree with the others", disagreeing.len(), views.len()));
+            contradictions.push(text!(
+                "{off} of {views} views disagree with the others",
+                off = disagreeing.len(),
+                views = views.len()
+            ));
         }
         let fit = Fit {
             median_m,
@@ -253,7 +260,7 @@ impl Judge<'_> {
     }
 
     /// That these poses are those of a camera, and none of a robot.
-    fn own_poses(&self, case: &Case, sight: &Sight, solution: &ClosedFormSolution, views: &[View]) -> Option<String> {
+    fn own_poses(&self, case: &Case, sight: &Sight, solution: &ClosedFormSolution, views: &[View]) -> Option<Text> {
         let over_noise = |view: &View| {
             // However the target was counted: its numbers say nothing of the noise.
             let covariance = sight.covariances.get(view.image).filter(|_| sight.turns.is_empty())?.as_ref()?;
@@ -264,9 +271,10 @@ impl Judge<'_> {
         let track = &self.recording.tracks[case.robot];
         match own_poses::whose(sight, solution, &over_noise)? {
             Whose::Camera => {
-                let why = format!(
+                let why = text!(
                     "these poses are the camera's own poses, computed from the target in {of} as calibrateCamera and solvePnP do \
-                     (the target in the camera, or the camera as seen from the target), and none of a robot"
+                     (the target in the camera, or the camera as seen from the target), and none of a robot",
+                    of = of
                 );
                 self.own.borrow_mut().insert(case.robot, why.clone());
                 Some(why)
@@ -277,10 +285,11 @@ impl Judge<'_> {
                 let cameras = self.recording.streams.iter().filter(|stream| !stream.is_depth).count();
                 let may_be = matches!(case.source, Source::Track(_)) || cameras > 1;
                 (may_be && track.role == Role::Unknown && self.settings.poses.is_none()).then(|| {
-                    format!(
+                    text!(
                         "these poses are in the frame of the target that {of} shows, as another camera's own poses of it are, and \
-                         none of a robot; if they are a robot's, say --set poses={}",
-                        track.name
+                         none of a robot; if they are a robot's, say --set poses={series}",
+                        of = of,
+                        series = &track.name
                     )
                 })
             }
@@ -312,8 +321,8 @@ impl Judge<'_> {
             field_of_view::outside(&seen)
         };
         let is_recorded = |h: &Hypothesis| matches!(h.source, Source::Track(_));
-        let found: Vec<Option<String>> = hypotheses.iter().map(|h| outside(h).filter(|_| is_recorded(h))).collect();
-        let is_seen = |(h, why): (&Hypothesis, &Option<String>)| is_recorded(h) && h.explains() && why.is_none();
+        let found: Vec<Option<Text>> = hypotheses.iter().map(|h| outside(h).filter(|_| is_recorded(h))).collect();
+        let is_seen = |(h, why): (&Hypothesis, &Option<Text>)| is_recorded(h) && h.explains() && why.is_none();
         if hypotheses.iter().zip(&found).any(is_seen) {
             for (h, why) in hypotheses.iter_mut().zip(found) {
                 h.contradictions.extend(why);
@@ -348,10 +357,10 @@ impl Judge<'_> {
         (best.1 <= limit && TIMES * best.1 < own_m).then_some(best)
     }
 
-    fn image_name(&self, source: Source, image: usize) -> String {
+    fn image_name(&self, source: Source, image: usize) -> Value {
         match source {
-            Source::Stream(i) => self.recording.streams[i].images[image].shown(),
-            Source::Track(i) => self.recording.tracks[i].samples[image].place.clone(),
+            Source::Stream(i) => self.recording.streams[i].images[image].shown().into(),
+            Source::Track(i) => Value::from(&*self.recording.tracks[i].samples[image].place),
         }
     }
 

@@ -10,10 +10,11 @@ use super::formats::{
     blocks, board_words, corners, easy_handeye, industrial_calibration, intrinsics, joints, npz, program, rosbag,
     table, text_camera, visp, xml,
 };
-use super::recording::{FoundTarget, Known, Recording, Stream, Track};
+use super::recording::{FoundMode, FoundTarget, Recording, Stream, Track};
 use super::value::{self, Value};
 use crate::budget::Budget;
-use crate::estimate::handeye::Mode;
+use crate::text;
+use crate::wording::Text;
 
 /// Files of text that are read at the most.
 const MOST_DOCUMENTS: usize = 5000;
@@ -34,10 +35,10 @@ impl<'a> Reader<'a> {
         Self { root, recording, budget, documents: 0 }
     }
 
-    fn warn(&mut self, file: &Path, why: impl std::fmt::Display) {
+    fn warn(&mut self, file: &Path, why: Text) {
         const MOST: usize = 50;
         if self.recording.warnings.len() < MOST {
-            self.recording.warnings.push(format!("{}: {why}", file.display()));
+            self.recording.warnings.push(text!("{name}: {why}", name = file.display(), why = why));
         }
     }
 
@@ -50,13 +51,13 @@ impl<'a> Reader<'a> {
             Ok(text) if is_too_long(file, &text) => {
                 self.warn(
                     file,
-                    format_args!("is not used: it has more than {MOST_LINES} lines, which no table of poses has"),
+                    text!("is not used: it has more than {most} lines, which no table of poses has", most = MOST_LINES),
                 );
                 None
             }
             Ok(text) => Some(text),
             Err(error) => {
-                self.recording.warnings.push(error.to_string());
+                self.recording.warnings.push(error.into());
                 None
             }
         }
@@ -72,7 +73,7 @@ impl<'a> Reader<'a> {
         match parsed {
             Ok(value) => Some(value),
             Err(why) => {
-                self.warn(file, format_args!("is not used: {}", why.lines().next().unwrap_or_default()));
+                self.warn(file, not_used(why));
                 None
             }
         }
@@ -164,7 +165,7 @@ impl<'a> Reader<'a> {
             let name = if files.len() > 1 { &folder } else { files[0] };
             let read = rosbag::read(&name.display().to_string(), &parts, self.budget, &mut self.recording);
             if let Err(why) = read {
-                self.warn(files[0], format_args!("is not used: {why}"));
+                self.warn(files[0], not_used(why));
             }
         }
     }
@@ -243,10 +244,11 @@ impl<'a> Reader<'a> {
     }
 
     /// Two files that say different things leave it open.
-    fn mode(&mut self, mode: Known<Mode>) {
+    fn mode(&mut self, mode: FoundMode) {
         match &self.recording.mode {
             Some(known) if known.value != mode.value => {
-                let warning = format!("{} and {} contradict each other", known.why, mode.why);
+                let warning =
+                    text!("{first} and {second} contradict each other", first = known.why(), second = mode.why());
                 self.recording.warnings.push(warning);
                 self.recording.mode = None;
             }
@@ -299,9 +301,9 @@ impl<'a> Reader<'a> {
             }
             let name = file.display().to_string();
             match folder::bytes(&self.root.join(file)) {
-                Err(error) => self.recording.warnings.push(error.to_string()),
+                Err(error) => self.recording.warnings.push(error.into()),
                 Ok(bytes) => match npz::read(&name, &bytes, self.budget) {
-                    Err(why) => self.warn(file, format_args!("is not used: {why}")),
+                    Err(why) => self.warn(file, not_used(why)),
                     Ok((tracks, warnings)) => {
                         self.recording.tracks.extend(tracks);
                         self.recording.warnings.extend(warnings);
@@ -310,6 +312,11 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// That a file is left out.
+fn not_used(why: Text) -> Text {
+    text!("is not used: {why}", why = why)
 }
 
 /// Whether a text is a table, a program or a report of more lines than are read.

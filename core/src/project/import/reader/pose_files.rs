@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::Reader;
 use crate::project::import::folder;
@@ -27,7 +28,7 @@ impl Reader<'_> {
                 let sample = Sample {
                     image: image.clone(),
                     number: number.or(fields.number),
-                    place: file.display().to_string(),
+                    place: Arc::new(single::place(file)),
                     numbers,
                     joints: fields.joints.clone(),
                 };
@@ -43,7 +44,7 @@ impl Reader<'_> {
             if 2 * samples.len() < read.len() {
                 continue;
             }
-            samples.sort_by(|a, b| crate::natural_order::compare(&a.place, &b.place));
+            samples.sort_by(|a, b| crate::natural_order::compare(&a.place.to_string(), &b.place.to_string()));
             let Some(mut track) = tree::track(tree::track_name(&files, &path), &path, stated, samples) else {
                 continue;
             };
@@ -62,9 +63,9 @@ impl Reader<'_> {
         }
         let values = read.iter().filter_map(|(file, number, value)| {
             let fields = tree::fields(value);
-            let place = file.display().to_string();
             let has_alone = fields.poses.is_empty() && !fields.joints.is_empty();
-            has_alone.then(|| joints::sample(place, fields.image, number.or(fields.number), fields.joints))
+            has_alone
+                .then(|| joints::sample(single::place(file), fields.image, number.or(fields.number), fields.joints))
         });
         let values: Vec<_> = values.collect();
         let series =
@@ -96,9 +97,9 @@ impl Reader<'_> {
     /// A pose to a file of text; whether it is so.
     pub(super) fn one_pose_to_a_text(&mut self, texts: &[(PathBuf, Option<u64>, String)]) -> bool {
         let name = folder::shown(texts.iter().map(|(file, ..)| file.as_path()));
-        let rows = texts.iter().filter_map(|(file, number, text)| {
-            Some((None, *number, file.display().to_string(), single::numbers(text)?))
-        });
+        let rows = texts
+            .iter()
+            .filter_map(|(file, number, text)| Some((None, *number, single::place(file), single::numbers(text)?)));
         let rows = joints::unnamed(&name, rows).filter(|series| 2 * series.samples.len() >= texts.len());
         self.recording.rows.extend(rows);
         let tracks = single::texts(&name, self.role_of(&name), texts);

@@ -11,6 +11,7 @@ use super::{STILL_M, STILL_RAD, images};
 use crate::budget::Budget;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::project::import::recording::FoundCamera;
+use crate::wording::Text;
 
 /// Most messages of one kind that are kept, and most things that are told apart.
 pub(super) const MOST_MESSAGES: usize = 2_000_000;
@@ -38,7 +39,7 @@ impl Bag {
     ///
     /// # Errors
     /// A sentence, where one is no bag or the budget is spent.
-    pub fn read(parts: &[PathBuf], budget: &Budget<'_>) -> Result<Self, String> {
+    pub fn read(parts: &[PathBuf], budget: &Budget<'_>) -> Result<Self, Text> {
         let mut bag = Self::default();
         for part in parts {
             // A message that is not as its type says is left out.
@@ -106,7 +107,7 @@ impl Bag {
                 let intrinsics = Intrinsics { width, height, fx: k[0]?, fy: k[4]?, cx: k[2]?, cy: k[5]?, distortion };
                 intrinsics.validate().ok()?;
                 if self.cameras.len() < MOST_NAMES {
-                    let why = "CameraInfo".to_owned();
+                    let why = "CameraInfo";
                     self.cameras.insert(topic.to_owned(), FoundCamera { name: topic.to_owned(), intrinsics, why });
                 }
             }

@@ -8,7 +8,10 @@ use image::{DynamicImage, GrayImage, RgbImage};
 
 use super::storage::{Message, visit};
 use crate::budget::Budget;
+use crate::project::files::image_file::foreign;
 use crate::project::import::recording::{ImageFile, Recording, Stream};
+use crate::text;
+use crate::wording::Text;
 
 /// The file of the image of a topic with a stamp.
 pub(super) fn name(topic: &str, stamp: i64) -> String {
@@ -28,11 +31,11 @@ pub(super) fn unpack(
     with_stamps: bool,
     budget: &Budget<'_>,
     recording: &mut Recording,
-) -> Result<(), String> {
+) -> Result<(), Text> {
     if chosen.is_empty() {
         return Ok(());
     }
-    let scratch = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let scratch = tempfile::tempdir().map_err(|e| foreign(&e))?;
     let mut streams: BTreeMap<String, Stream> = BTreeMap::new();
     let mut troubles = Vec::new();
     for part in parts {
@@ -41,8 +44,7 @@ pub(super) fn unpack(
             let found = stamp_of(&message).filter(|stamp| stamps.binary_search(stamp).is_ok());
             let Some(stamp) = found else { return };
             let path = scratch.path().join(name(message.topic, stamp));
-            let saved =
-                decoded(&message).and_then(|image| image.save(&path).map(|()| image).map_err(|e| e.to_string()));
+            let saved = decoded(&message).and_then(|image| image.save(&path).map(|()| image).map_err(|e| foreign(&e)));
             match saved {
                 Ok(image) => {
                     // What it takes on the disk is less than this, and not more than it tells.
@@ -61,7 +63,12 @@ pub(super) fn unpack(
                         stamp_ns: with_stamps.then_some(stamp),
                     });
                 }
-                Err(why) => troubles.push(format!("{file}: an image on {} is not used: {why}", message.topic)),
+                Err(why) => troubles.push(text!(
+                    "{file}: an image on {topic} is not used: {why}",
+                    file = file,
+                    topic = message.topic,
+                    why = why
+                )),
             }
         })?;
     }
@@ -82,14 +89,14 @@ pub(super) fn stamp_of(message: &Message) -> Option<i64> {
     Some(if stamp == 0 { message.log_ns } else { stamp })
 }
 
-fn decoded(message: &Message) -> Result<DynamicImage, String> {
-    let short = || "its message ends early".to_owned();
+fn decoded(message: &Message) -> Result<DynamicImage, Text> {
+    let short = || text!("its message ends early");
     let mut reader = message.reader().ok_or_else(short)?;
     reader.header().ok_or_else(short)?;
     if message.kind.ends_with("CompressedImage") {
         reader.text().ok_or_else(short)?;
         let bytes = reader.blob().ok_or_else(short)?;
-        return crate::project::files::image_file::decode_bytes(bytes).map_err(|e| e.to_string());
+        return crate::project::files::image_file::decode_bytes(bytes).map_err(Text::from);
     }
     let sizes = (reader.u32(), reader.u32());
     let (Some(height), Some(width)) = sizes else { return Err(short()) };
@@ -101,31 +108,37 @@ fn decoded(message: &Message) -> Result<DynamicImage, String> {
 }
 
 /// An image of which every row takes `step` bytes.
-fn raw(encoding: &str, (width, height): (u32, u32), step: usize, bytes: &[u8]) -> Result<DynamicImage, String> {
+fn raw(encoding: &str, (width, height): (u32, u32), step: usize, bytes: &[u8]) -> Result<DynamicImage, Text> {
+    let none = || text!("its size is none");
     let channels = match encoding {
         "rgb8" | "bgr8" | "8UC3" => 3,
         "rgba8" | "bgra8" => 4,
         "mono8" | "8UC1" => 1,
-        other => return Err(format!("its encoding is {other:?}: rgb8, bgr8, rgba8, bgra8 and mono8 are read")),
+        other => {
+            let encoding = format!("{other:?}");
+            return Err(text!(
+                "its encoding is {encoding}: rgb8, bgr8, rgba8, bgra8 and mono8 are read",
+                encoding = encoding
+            ));
+        }
     };
     let wide = width as usize * channels;
     if wide == 0 || height == 0 || step < wide {
-        return Err("its size is none".into());
+        return Err(none());
     }
     let mut pixels = Vec::new();
     for row in 0..height as usize {
-        let start = row.checked_mul(step).ok_or("its size is none")?;
-        let row = bytes.get(start..start.saturating_add(wide)).ok_or("its message ends early")?;
+        let start = row.checked_mul(step).ok_or_else(none)?;
+        let row = bytes.get(start..start.saturating_add(wide)).ok_or_else(|| text!("its message ends early"))?;
         match encoding {
             "bgr8" | "8UC3" | "bgra8" => pixels.extend(row.chunks_exact(channels).flat_map(|p| [p[2], p[1], p[0]])),
             "rgba8" => pixels.extend(row.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]])),
             _ => pixels.extend_from_slice(row),
         }
     }
-    let none = "its size is none".to_owned();
     if channels == 1 {
-        GrayImage::from_raw(width, height, pixels).map(DynamicImage::ImageLuma8).ok_or(none)
+        GrayImage::from_raw(width, height, pixels).map(DynamicImage::ImageLuma8).ok_or_else(none)
     } else {
-        RgbImage::from_raw(width, height, pixels).map(DynamicImage::ImageRgb8).ok_or(none)
+        RgbImage::from_raw(width, height, pixels).map(DynamicImage::ImageRgb8).ok_or_else(none)
     }
 }

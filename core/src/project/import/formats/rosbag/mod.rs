@@ -14,6 +14,7 @@ mod wire;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
@@ -21,6 +22,8 @@ use super::{joints, tree};
 use crate::budget::Budget;
 use crate::project::import::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use crate::project::import::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
+use crate::text;
+use crate::wording::Text;
 use contents::{Bag, Timed, nearest};
 
 /// Half of the time around an instant in which nothing may move.
@@ -42,11 +45,11 @@ pub(in crate::project::import) fn read(
     parts: &[PathBuf],
     budget: &Budget<'_>,
     recording: &mut Recording,
-) -> Result<(), String> {
+) -> Result<(), Text> {
     let (parts, _scratch) = storage::plain_parts(parts, budget)?;
     let bag = Bag::read(&parts, budget)?;
     if bag.images.is_empty() {
-        return Err("has no images".into());
+        return Err(text!("has no images"));
     }
     let motions = motion::motions(&bag, file);
     let mut at_rest: BTreeMap<String, Vec<i64>> = BTreeMap::new();
@@ -54,7 +57,7 @@ pub(in crate::project::import) fn read(
     let mut few_rests: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     for (topic, stamps) in &bag.images {
         let rests = rests(&bag, stamps, budget);
-        budget.check().map_err(|why| why.to_string())?;
+        budget.check()?;
         recording.beliefs.push(format!(
             "{file}: {} images on {topic}, {} of them taken where everything stood still",
             stamps.len(),
@@ -79,11 +82,10 @@ pub(in crate::project::import) fn read(
         }
     }
     if at_rest.is_empty() && moving.is_empty() {
-        return Err(
+        return Err(text!(
             "has no three instants at which the robot stood still, by its transforms or joint values, and not enough \
-                    images of one that moves"
-                .into(),
-        );
+             images of one that moves"
+        ));
     }
     images::unpack(file, &parts, &at_rest, false, budget, recording)?;
     images::unpack(file, &parts, &moving, true, budget, recording)?;
@@ -148,14 +150,19 @@ fn joints(bag: &Bag, file: &str, topic: &str, stamps: &[i64]) -> Vec<JointSeries
     let of = |((name, names), values): (&(String, Vec<String>), &Timed<Vec<f64>>)| {
         let sample = |stamp: &i64| {
             let values = nearest(values, *stamp, REST_NS)?.clone();
-            let place = format!("{file}, {name} at {:.3} s", *stamp as f64 * 1e-9);
-            Some(joints::sample(place, Some(images::name(topic, *stamp)), None, values))
+            Some(joints::sample(place(file, name, *stamp), Some(images::name(topic, *stamp)), None, values))
         };
         let unit = Some(Known::by("ROS has radians", AngleUnit::Radian));
         let samples = stamps.iter().filter_map(sample).collect();
         joints::series(format!("{file}:{name}"), names.clone(), unit, samples)
     };
     bag.joints.iter().filter_map(of).collect()
+}
+
+/// Where a message stands.
+fn place(file: &str, name: &str, stamp_ns: i64) -> Text {
+    let seconds = format!("{:.3}", stamp_ns as f64 * 1e-9);
+    text!("{file}, {name} at {seconds} s", file = file, name = name, seconds = seconds)
 }
 
 fn track(
@@ -175,7 +182,7 @@ fn track(
         Some(Sample {
             image: Some(images::name(topic, *stamp)),
             number: None,
-            place: format!("{file}, {name} at {:.3} s", *stamp as f64 * 1e-9),
+            place: Arc::new(place(file, name, *stamp)),
             numbers: Numbers::Quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w]),
             joints: arm.and_then(|values| nearest(values, *stamp, REST_NS).cloned()).unwrap_or_default(),
         })

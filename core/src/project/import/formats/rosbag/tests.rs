@@ -13,7 +13,7 @@ use crate::budget::{Limits, Spent};
 use crate::progress::CancelToken;
 
 /// Reads it without a limit of time.
-fn read_all(parts: &[PathBuf], recording: &mut Recording) -> Result<(), String> {
+fn read_all(parts: &[PathBuf], recording: &mut Recording) -> Result<(), Text> {
     let cancel = CancelToken::default();
     read("bag", parts, &Budget::new(Limits::default(), &|| Duration::ZERO, &cancel), recording)
 }
@@ -279,7 +279,7 @@ fn a_file_that_never_stops_growing_is_refused() {
     let cancel = CancelToken::default();
     let budget = Budget::new(limits, &|| Duration::ZERO, &cancel);
     let why = read("bag", &[file], &budget, &mut Recording::default()).expect_err("refused");
-    assert!(why.contains("unpack to more than 0.1 GiB"), "{why}");
+    assert!(why.to_string().contains("unpack to more than 0.1 GiB"), "{why}");
     assert_eq!(budget.check(), Err(Spent::Unpacked(limits.unpacked_bytes)));
 }
 
@@ -346,11 +346,11 @@ fn a_bag_of_every_kind_is_given_up_when_its_time_is_over_or_a_person_ends_it() {
         let budget = Budget::new(Limits::default(), &elapsed, &cancel);
         let mut recording = Recording::default();
         let why = read("bag", &[named(name)], &budget, &mut recording).expect_err(name);
-        assert!(why.contains("longer than 20 s"), "{name}: {why}");
+        assert!(why.to_string().contains("longer than 20 s"), "{name}: {why}");
         assert!(looks.get() < 30, "{name}: it went on after its time");
         cancel.cancel();
         let budget = Budget::new(Limits::default(), &|| Duration::ZERO, &cancel);
-        assert_eq!(read("bag", &[named(name)], &budget, &mut recording), Err("cancelled".to_owned()), "{name}");
+        assert_eq!(read("bag", &[named(name)], &budget, &mut recording), Err(Spent::Cancelled.into()), "{name}");
     }
 }
 

@@ -1,14 +1,16 @@
 //! Tables without a header: what the numbers themselves say of where a pose stands.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
 use super::cells::Line;
-use super::{name_of, sample, whole};
+use super::{name_of, place, sample, whole};
 use crate::project::import::conventions::{is_rotation, is_unit, rigid};
 use crate::project::import::formats::tree::{self, LEAST_POSES};
 use crate::project::import::recording::{Numbers, Role, Sample, Stated, Track};
+use crate::wording::Text;
 
 /// Four rows of four numbers to a pose, as `numpy.savetxt` and others write them.
 pub(super) fn blocks(file: &str, rows: &[&Line]) -> Option<Track> {
@@ -35,15 +37,15 @@ const MOST_ROWS_TO_A_POSE: usize = 8;
 pub(in crate::project::import::formats) struct Row {
     pub image: Option<String>,
     pub number: Option<u64>,
-    pub place: String,
+    pub place: Arc<Text>,
     pub numbers: Vec<f64>,
 }
 
 pub(super) fn without_header(file: &str, lines: &[&Line]) -> Vec<Track> {
     let mut by_width: BTreeMap<usize, Vec<Row>> = BTreeMap::new();
     for line in lines {
-        let (numbers, place) = (line.numbers(), format!("{file}, row {}", line.row));
-        let row = Row { image: name_of(line), number: None, place, numbers };
+        let row =
+            Row { image: name_of(line), number: None, place: Arc::new(place(file, line)), numbers: line.numbers() };
         by_width.entry(row.numbers.len()).or_default().push(row);
     }
     // The number of numbers that most rows have, or most of those that a pose may have; rows with another number are remarks.
@@ -93,7 +95,7 @@ pub(in crate::project::import::formats) fn tracks(name: &str, rows: &[Row]) -> V
             let pose = layout.pose(&row.numbers)?;
             let counted = layout.index.and_then(|i| whole(*row.numbers.get(i)?));
             let joints = layout.joints.clone().and_then(|range| row.numbers.get(range)).unwrap_or_default().to_vec();
-            let (image, place) = (row.image.clone(), row.place.clone());
+            let (image, place) = (row.image.clone(), Arc::clone(&row.place));
             Some(Sample { image, number: row.number.or(counted), place, numbers: pose, joints })
         });
         let place = if places <= 1 {

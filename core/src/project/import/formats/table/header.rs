@@ -224,7 +224,7 @@ pub(super) fn joints(file: &str, lines: &[Line]) -> Option<JointSeries> {
     let samples = lines[at + 1..].iter().filter_map(|line| {
         let values = beside.joints.iter().map(|i| number(line.cells.get(*i)?)).collect::<Option<Vec<f64>>>()?;
         let (image, number) = called(line, &beside);
-        Some(joints::sample(format!("{file}, row {}", line.row), image, number, values))
+        Some(joints::sample(super::place(file, line), image, number, values))
     });
     joints::series(file.to_owned(), Vec::new(), unit, samples.collect())
 }

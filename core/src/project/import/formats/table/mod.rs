@@ -6,11 +6,14 @@ mod header;
 mod labels;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::joints;
 use super::tree::is_image_name;
 use crate::project::import::recording::{JointSeries, Numbers, Sample, Track};
 use crate::project::import::value::number;
+use crate::text;
+use crate::wording::Text;
 use cells::Line;
 
 /// The series of poses in a text, which may be none.
@@ -66,10 +69,8 @@ pub(in crate::project::import) fn unnamed(file: &str, text: &str) -> Option<Join
     if header::with_header(file, &lines).is_some() || header::joints(file, &lines).is_some() {
         return None;
     }
-    let rows = lines.iter().filter(|line| line.is_numeric()).map(|line| {
-        let place = format!("{file}, row {}", line.row);
-        (name_of(line), None, place, line.numbers())
-    });
+    let rows = lines.iter().filter(|line| line.is_numeric());
+    let rows = rows.map(|line| (name_of(line), None, place(file, line), line.numbers()));
     joints::unnamed(file, rows)
 }
 
@@ -81,7 +82,12 @@ fn sample(
     numbers: Numbers,
     joints: Vec<f64>,
 ) -> Sample {
-    Sample { image, number, place: format!("{file}, row {}", line.row), numbers, joints }
+    Sample { image, number, place: Arc::new(place(file, line)), numbers, joints }
+}
+
+/// Where a row stands.
+fn place(file: &str, line: &Line) -> Text {
+    text!("{file}, row {row}", file = file, row = line.row)
 }
 
 /// The name of an image in a row.

@@ -25,7 +25,7 @@ fn every_delimiter_gives_the_same_numbers() {
         assert_eq!(track.samples.len(), 4, "{by:?}");
         for (i, sample) in track.samples.iter().enumerate() {
             assert_eq!(sample.numbers, Numbers::Angles(row(i)), "{by:?}, {comma}");
-            assert_eq!(sample.place, format!("poses.txt, row {}", i + 1));
+            assert_eq!(sample.place.to_string(), format!("poses.txt, row {}", i + 1));
         }
     }
 }

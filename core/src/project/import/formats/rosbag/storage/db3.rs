@@ -7,9 +7,11 @@ use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OpenFlags};
 
 use super::{Channel, Each, MOST_RECORD_BYTES};
+use crate::project::files::image_file::foreign;
 use crate::project::import::formats::rosbag::wire::Encoding;
+use crate::wording::Text;
 
-pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), String> {
+pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), Text> {
     let mut open = || -> rusqlite::Result<()> {
         // Whoever records still holds its journal: nothing beside the file is made.
         let bag =
@@ -39,5 +41,5 @@ pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), String> {
         }
         Ok(())
     };
-    open().map_err(|e| e.to_string())
+    open().map_err(|e| foreign(&e))
 }

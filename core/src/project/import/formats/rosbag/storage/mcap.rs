@@ -15,10 +15,12 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use super::{Channel, Each, Flow, MOST_RECORD_BYTES, bounded};
 use crate::budget::Budget;
+use crate::project::files::image_file::foreign;
 use crate::project::import::formats::rosbag::wire::Encoding;
+use crate::wording::Text;
 
-pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut Each<'_>) -> Result<(), String> {
-    let mut file = File::open(file).map_err(|e| e.to_string())?;
+pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut Each<'_>) -> Result<(), Text> {
+    let mut file = File::open(file).map_err(|e| foreign(&e))?;
     let options = LinearReaderOptions::default().with_record_length_limit(MOST_RECORD_BYTES).with_emit_chunks(true);
     let mut reader = LinearReader::new_with_options(options);
     let mut bag = Bag { schemas: BTreeMap::new(), channels: BTreeMap::new(), each };
@@ -29,7 +31,7 @@ pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut Each<'_>) -> Re
         }
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let read = file.read(reader.insert(wanted)).map_err(|e| e.to_string())?;
+                let read = file.read(reader.insert(wanted)).map_err(|e| foreign(&e))?;
                 reader.notify_read(read);
             }
             Ok(LinearReadEvent::Record { opcode, data }) => {
@@ -44,7 +46,7 @@ pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut Each<'_>) -> Re
                     break;
                 }
             }
-            Err(error) if !has_begun => return Err(error.to_string()),
+            Err(error) if !has_begun => return Err(foreign(&error)),
             Err(_) => break,
         }
     }

@@ -12,6 +12,7 @@ use std::path::Path;
 
 use super::wire::{Encoding, Reader};
 use crate::budget::Budget;
+use crate::wording::Text;
 
 pub(super) use self::zstd::plain_parts;
 
@@ -41,7 +42,7 @@ impl<'a> Message<'a> {
 ///
 /// # Errors
 /// A sentence, where it is no bag or the budget is spent.
-pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut dyn FnMut(Message)) -> Result<(), String> {
+pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut dyn FnMut(Message)) -> Result<(), Text> {
     let ends = |with: &str| file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(with));
     let mut each = |message: Message| {
         zstd::with_plain_data(message, each);
@@ -54,7 +55,7 @@ pub(super) fn visit(file: &Path, budget: &Budget<'_>, each: &mut dyn FnMut(Messa
     } else {
         mcap::visit(file, budget, &mut each)?;
     }
-    budget.check().map_err(|why| why.to_string())
+    Ok(budget.check()?)
 }
 
 /// Whether more messages are wanted.

@@ -11,7 +11,10 @@ use std::path::Path;
 use bzip2::read::BzDecoder;
 
 use super::{Channel, Each, MOST_RECORD_BYTES};
+use crate::project::files::image_file::foreign;
 use crate::project::import::formats::rosbag::wire::Encoding;
+use crate::text;
+use crate::wording::Text;
 
 const MAGIC: &[u8; 13] = b"#ROSBAG V2.0\n";
 /// Longest header of a record: names of a topic and a type.
@@ -23,15 +26,15 @@ const MESSAGE: u8 = 2;
 const CHUNK: u8 = 5;
 const CONNECTION: u8 = 7;
 
-pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), String> {
-    let mut input = BufReader::new(File::open(file).map_err(|e| e.to_string())?);
+pub(super) fn visit(file: &Path, each: &mut Each<'_>) -> Result<(), Text> {
+    let mut input = BufReader::new(File::open(file).map_err(|e| foreign(&e))?);
     let mut magic = [0; MAGIC.len()];
     let read = input.read_exact(&mut magic);
     if read.is_err() || magic != *MAGIC {
         return Err(if magic.starts_with(b"#ROSBAG V") {
-            "is a bag of ROS 1 of a version before 2.0: `rosbag filter OLD NEW True` writes one of version 2.0".into()
+            text!("is a bag of ROS 1 of a version before 2.0: `rosbag filter OLD NEW True` writes one of version 2.0")
         } else {
-            "is no bag of ROS 1".into()
+            text!("is no bag of ROS 1")
         });
     }
     let mut bag = Bag { channels: BTreeMap::new(), each, is_over: false };

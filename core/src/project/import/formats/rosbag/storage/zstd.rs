@@ -9,7 +9,10 @@ use zstd::stream::read::Decoder;
 
 use super::{MOST_RECORD_BYTES, Message, bounded};
 use crate::budget::Budget;
+use crate::project::files::image_file::foreign;
 use crate::project::import::formats::rosbag::wire::Encoding;
+use crate::text;
+use crate::wording::Text;
 
 /// What a frame begins with. CDR begins with zero.
 const MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
@@ -28,15 +31,15 @@ fn is_compressed(file: &Path) -> bool {
 pub(in super::super) fn plain_parts(
     parts: &[PathBuf],
     budget: &Budget<'_>,
-) -> Result<(Vec<PathBuf>, Option<TempDir>), String> {
+) -> Result<(Vec<PathBuf>, Option<TempDir>), Text> {
     if !parts.iter().any(|part| is_compressed(part)) {
         return Ok((parts.to_vec(), None));
     }
-    let scratch = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let scratch = tempfile::tempdir().map_err(|e| foreign(&e))?;
     let mut plain = Vec::with_capacity(parts.len());
     for part in parts {
         if is_compressed(part) {
-            let name = part.file_stem().ok_or("has no name")?;
+            let name = part.file_stem().ok_or_else(|| text!("has no name"))?;
             let unpacked = scratch.path().join(name);
             unpack(part, &unpacked, budget)?;
             plain.push(unpacked);
@@ -47,8 +50,8 @@ pub(in super::super) fn plain_parts(
     Ok((plain, Some(scratch)))
 }
 
-fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), String> {
-    let said = |e: io::Error| e.to_string();
+fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), Text> {
+    let said = |e: io::Error| foreign(&e);
     let file = File::open(from).map_err(said)?;
     let mut out = File::create_new(to).map_err(said)?;
     let mut input = Decoder::new(file).map_err(said)?;
@@ -58,7 +61,7 @@ fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), String> {
         match input.read(&mut piece) {
             Ok(0) => return Ok(()),
             Ok(count) => {
-                budget.unpack(count as u64).map_err(|why| why.to_string())?;
+                budget.unpack(count as u64)?;
                 out.write_all(&piece[..count]).map_err(said)?;
                 is_empty = false;
             }
@@ -67,7 +70,7 @@ fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), String> {
                 tracing::debug!("{} breaks off: {error}", from.display());
                 return Ok(());
             }
-            Err(error) => return Err(format!("cannot be unpacked: {error}")),
+            Err(error) => return Err(text!("cannot be unpacked: {why}", why = error)),
         }
     }
 }
