@@ -114,7 +114,7 @@ fn search(
     parameters.set_marker_border_bits(border_bits as i32);
     parameters.set_corner_refinement_method(method);
     // OpenCV keeps the outermost of quads whose corners are near each other, as a part of the perimeter. That of the paper around a
-    // tag with one cell of margin is 0.035 away, that of a square around the marker of a ChArUco board 0.02.
+    // tag with one cell of margin is 0.035 away, that of a square whose marker is nine tenths of it 0.02.
     parameters.set_min_marker_distance_rate(0.01);
     if effort == Effort::Thorough {
         // Markers down to a hundredth of the image, and windows for larger ones in uneven light.
