@@ -43,7 +43,11 @@ pub fn import_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         target_ui(ui, import, language, outbox);
         if import.found.as_deref().is_some_and(|found| !found.opened.joints.is_empty()) {
-            arm_ui(ui, import, language, outbox);
+            typed_ui(ui, &Typed::arm(), import, language, outbox);
+        }
+        let without_size = |stream: &Stream| stream.points.is_some() && stream.size == (0, 0);
+        if import.found.as_deref().is_some_and(|found| found.opened.streams.iter().any(without_size)) {
+            typed_ui(ui, &Typed::image_size(), import, language, outbox);
         }
         meaning_ui(ui, import, language, outbox);
     });
@@ -185,26 +189,56 @@ fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut
     );
 }
 
-/// The arm that makes poses of joint values.
-fn arm_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
-    let id = Id::new(("arm of the recording", &import.path));
-    let known = || import.fixed.get("arm").cloned().unwrap_or_default();
+/// A setting that a person types.
+struct Typed {
+    key: &'static str,
+    label: Text,
+    example: &'static str,
+    button: Text,
+    hint: Text,
+}
+
+impl Typed {
+    /// The arm that makes poses of joint values.
+    fn arm() -> Self {
+        Self {
+            key: "arm",
+            label: text!("Arm"),
+            example: "ur5e, robot.urdf",
+            button: text!("Compute poses"),
+            hint: text!("Poses are computed from joint values by the chain of this arm, built in or in a URDF file."),
+        }
+    }
+
+    /// How large the images were that corners are from.
+    fn image_size() -> Self {
+        Self {
+            key: "image_size",
+            label: text!("Image size"),
+            example: "1280x720",
+            button: text!("Look again"),
+            hint: text!("The files have corners without their images: width and height of the images in pixels."),
+        }
+    }
+}
+
+fn typed_ui(ui: &mut Ui, of: &Typed, import: &ImportState, language: Language, outbox: &mut Outbox) {
+    let id = Id::new(("typed setting of the recording", of.key, &import.path));
+    let known = || import.fixed.get(of.key).cloned().unwrap_or_default();
     let mut typed: String = ui.data_mut(|data| data.get_temp(id)).unwrap_or_else(known);
-    parts::row_ui(ui, tr!(language, "Arm"), |ui| {
-        let field = TextEdit::singleline(&mut typed).desired_width(260.0).char_limit(400).hint_text("ur5e, robot.urdf");
+    let label = of.label.say(language);
+    parts::row_ui(ui, &label, |ui| {
+        let field = TextEdit::singleline(&mut typed).desired_width(260.0).char_limit(400).hint_text(of.example);
         let response = ui.add(field);
-        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Arm")));
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &label));
         let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        if ui.button(tr!(language, "Compute poses")).clicked() || entered {
+        if ui.button(of.button.say(language)).clicked() || entered {
             let value = (!typed.trim().is_empty()).then(|| typed.trim().to_owned());
-            outbox.send(Command::FixConvention { key: "arm".to_owned(), value });
+            outbox.send(Command::FixConvention { key: of.key.to_owned(), value });
         }
     });
     ui.data_mut(|data| data.insert_temp(id, typed));
-    parts::hint_ui(
-        ui,
-        tr!(language, "Poses are computed from joint values by the chain of this arm, built in or in a URDF file."),
-    );
+    parts::hint_ui(ui, &of.hint.say(language));
 }
 
 /// The hypotheses.

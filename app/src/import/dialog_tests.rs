@@ -163,6 +163,38 @@ fn what_is_known_is_fixed_and_given_back_to_the_data() {
     assert_eq!(pane.click("eye_to_hand"), [Command::FixConvention { key: "mode".to_owned(), value }]);
 }
 
+/// The command line names the option; whoever is at the window needs a field.
+#[test]
+fn the_size_of_images_that_no_file_tells_is_typed() {
+    let corners = |size: (u32, u32)| {
+        let name = "corners.json".to_owned();
+        let points = Some(vec![Some(vec![[1.0, 2.0]]); 4]);
+        let recording = Recording {
+            streams: vec![Stream { name, images: Vec::new(), size, is_depth: false, points }],
+            ..Recording::default()
+        };
+        let trouble = import::size_of_points(&recording.streams[0], None).err();
+        let found = found_in(recording, two().judgement.expect("judged"));
+        let mut pane = driven(Some(Found { judgement: None, previews: Arc::default(), ..found }), None);
+        pane.model().import.as_deref_mut().expect("open").trouble = trouble;
+        pane.steps();
+        pane
+    };
+    let said = "width and height of the images in pixels";
+    assert!(!corners((640, 480)).sees(said));
+    let mut pane = corners((0, 0));
+    assert!(pane.sees(said) && pane.sees("no file says how large the images were"));
+    pane.harness.get_by_role_and_label(Role::TextInput, "Image size").click();
+    pane.steps();
+    pane.harness.get_by_role_and_label(Role::TextInput, "Image size").type_text("1280x720");
+    pane.steps();
+    let value = Some("1280x720".to_owned());
+    assert_eq!(pane.press(egui::Key::Enter), [Command::FixConvention { key: "image_size".to_owned(), value }]);
+    pane.model().view.language = Language::Chinese;
+    pane.steps();
+    assert!(pane.sees("没有文件说明图像的大小"));
+}
+
 #[test]
 fn a_recording_that_is_contradicted_or_not_read_says_why() {
     let why = Text::verbatim("image2.png fits the pose of poses.txt, row 3");

@@ -192,7 +192,7 @@ fn examine(
 ) -> Result<(), String> {
     let cancelled = || "cancelled".to_owned();
     let lens = calibration.as_deref().and_then(|calibration| calibration.lens_by_corners);
-    let sight = views::SessionViews::new(observations, lens)?;
+    let sight = views::SessionViews::new(observations, lens).map_err(|why| why.to_string())?;
     diagnosis.findings.extend(words::not_finite(&sight));
     diagnosis.findings.extend(words::wrong_corners(&sight));
     let views = sight.views.len();

@@ -19,6 +19,8 @@ use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, Corners};
+use crate::text;
+use crate::wording::Text;
 
 /// A corner this many robust standard deviations from where its view puts it is wrong. Real detectors have long tails,
 /// so the limit is wide.
@@ -123,8 +125,8 @@ impl SessionViews {
 
     /// Looks at all views in the fit that have a robot pose and the target. `lens` is the camera as the corners alone show it,
     /// where that was found before. `Err` says why nothing can be tested.
-    pub fn new(observations: &Observations, lens: Option<Intrinsics>) -> Result<Self, String> {
-        let Some(mode) = observations.mode else { return Err("there are no robot poses".to_owned()) };
+    pub fn new(observations: &Observations, lens: Option<Intrinsics>) -> Result<Self, Text> {
+        let Some(mode) = observations.mode else { return Err(text!("there are no robot poses")) };
         let in_fit: Vec<&ObservedView> = observations.views.iter().filter(|v| v.in_fit).collect();
         let rows = in_fit.iter().copied().enumerate();
         let (finite, broken): (Vec<Row<'_>>, Vec<Row<'_>>) = rows.partition(|(_, v)| is_finite(v));
@@ -186,7 +188,7 @@ impl SessionViews {
         observations: &Observations,
         seen: &[Row<'_>],
         lens: Option<Intrinsics>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Text> {
         let all: Vec<Corners> = seen.iter().map(|(_, v)| v.corners.clone().unwrap_or_default()).collect();
         let mut camera = lens.map_or_else(|| camera_of(observations, &all), Ok)?;
         let mut fits = fit_all(&all, &observations.target, &camera);
@@ -201,7 +203,7 @@ impl SessionViews {
         let count = free.count(&camera);
         let variances = fits.iter().flatten().map(Fit::variance_px2);
         let Some(typical) = median(variances) else {
-            return Err("the target's pose could not be found in any view".to_owned());
+            return Err(text!("the target's pose could not be found in any view"));
         };
         // Nothing is judged by less.
         let typical = typical.max(resolution::CORNER_PX.powi(2));
@@ -314,7 +316,7 @@ fn board(points: &[Point3<f64>]) -> ([Point3<f64>; 4], Matrix6<f64>) {
 }
 
 /// The camera given, or found from the corners alone: the robot may be what is wrong.
-fn camera_of(observations: &Observations, views: &[Corners]) -> Result<Intrinsics, String> {
+fn camera_of(observations: &Observations, views: &[Corners]) -> Result<Intrinsics, Text> {
     match observations.camera {
         CameraKnowledge::Fixed(intrinsics) => Ok(intrinsics),
         CameraKnowledge::Estimate { model, start } => {
@@ -324,7 +326,7 @@ fn camera_of(observations: &Observations, views: &[Corners]) -> Result<Intrinsic
             let (target, size) = (&observations.target, observations.image_size);
             intrinsics::solve(&chosen, target, size, &options, &CancelToken::default())
                 .map(|found| found.intrinsics)
-                .map_err(|error| format!("the camera could not be calibrated: {error}"))
+                .map_err(|error| text!("the camera could not be calibrated: {error}", error = error))
         }
     }
 }

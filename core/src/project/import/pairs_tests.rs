@@ -272,8 +272,8 @@ fn the_size_of_images_that_are_not_there_is_never_guessed() {
     }
     let recording = open(folder.path()).expect("a recording");
     let of = |size: Option<(u32, u32)>| size_of_points(&recording.streams[0], size);
-    assert!(of(None).expect_err("nobody says it").contains("--set image_size=WIDTHxHEIGHT"));
-    assert!(of(Some((60, 40))).expect_err("it is another").contains("beside an image of 60×40 px"));
+    assert!(of(None).expect_err("nobody says it").to_string().contains("--set image_size=WIDTHxHEIGHT"));
+    assert!(of(Some((60, 40))).expect_err("it is another").to_string().contains("beside an image of 60×40 px"));
     let mut settings = Settings::default();
     settings.set(&format!("image_size={}x{}", session.image_size.0, session.image_size.1)).expect("a size");
     assert_eq!(of(settings.image_size), Ok(session.image_size));

@@ -13,6 +13,8 @@ use crate::geometry::frames::Pose;
 use crate::geometry::statistics::median;
 use crate::targets::TargetSpec;
 use crate::targets::observation::Corner;
+use crate::text;
+use crate::wording::Text;
 
 /// The target's pose in images, or as it was recorded.
 #[derive(Debug, Clone)]
@@ -41,7 +43,7 @@ impl Sight {
         image_size: (u32, u32),
         camera: CameraKnowledge,
         corners: &[Option<Vec<Corner>>],
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Text> {
         // The robot is not asked: its poses are what is in doubt.
         let view = |(index, corners): (usize, &Option<Vec<Corner>>)| {
             ObservedView::new(index.to_string(), Some(Pose::identity()), corners.clone())
@@ -76,7 +78,7 @@ impl Sight {
         stream: &Stream,
         image_size: Option<(u32, u32)>,
         camera: CameraKnowledge,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Text> {
         let corners = recorded_corners(stream, &target)?;
         let size = size_of_points(stream, image_size)?;
         Self::of_corners(target, size, camera, &corners)
@@ -111,7 +113,7 @@ impl Sight {
 ///
 /// # Errors
 /// A sentence, where they are not those of this target.
-pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<Vec<Option<Vec<Corner>>>, String> {
+pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<Vec<Option<Vec<Corner>>>, Text> {
     let views = stream.points.as_deref().unwrap_or_default();
     views.iter().map(|points| points.as_ref().map(|points| corners::numbered(points, target)).transpose()).collect()
 }
@@ -120,17 +122,20 @@ pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<V
 ///
 /// # Errors
 /// A sentence, where neither does, or points are beside the image.
-pub fn size_of_points(stream: &Stream, said: Option<(u32, u32)>) -> Result<(u32, u32), String> {
+pub fn size_of_points(stream: &Stream, said: Option<(u32, u32)>) -> Result<(u32, u32), Text> {
     let size = said.or((stream.size != (0, 0)).then_some(stream.size));
-    let (width, height) =
-        size.ok_or("no file says how large the images were: --set image_size=WIDTHxHEIGHT does, in pixels")?;
+    let (width, height) = size.ok_or_else(|| {
+        text!("no file says how large the images were: --set image_size=WIDTHxHEIGHT does, in pixels")
+    })?;
     let is_inside = stream.points.iter().flatten().flatten().all(|points| corners::are_inside(points, (width, height)));
     if is_inside {
         Ok((width, height))
     } else {
-        Err(format!(
+        Err(text!(
             "there are corners beside an image of {width}×{height} px: if width and height are exchanged or of another image, say \
-             --set image_size=WIDTHxHEIGHT"
+             --set image_size=WIDTHxHEIGHT",
+            width = width,
+            height = height
         ))
     }
 }

@@ -10,6 +10,8 @@ use crate::project::import::recording::{FoundTarget, ImageFile, Stream};
 use crate::project::import::value::Value;
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
+use crate::text;
+use crate::wording::Text;
 
 /// Points of the smallest board, and of the largest.
 const LEAST_POINTS: usize = 9;
@@ -305,19 +307,24 @@ fn board(value: &Value, depth: usize) -> Option<Grid> {
 ///
 /// # Errors
 /// A sentence, where the target has another number of points, or is none of a grid.
-pub(in crate::project::import) fn numbered(points: &[Point], target: &TargetSpec) -> Result<Vec<Corner>, String> {
+pub(in crate::project::import) fn numbered(points: &[Point], target: &TargetSpec) -> Result<Vec<Corner>, Text> {
     let grid = match target {
         TargetSpec::Chessboard(grid) | TargetSpec::Circles(grid) => *grid,
         other => {
-            return Err(format!("recorded corners are those of a chessboard or a grid of dots, and {other} was given"));
+            return Err(text!(
+                "recorded corners are those of a chessboard or a grid of dots, and {other} was given",
+                other = other.said()
+            ));
         }
     };
     let (columns, rows) = (grid.columns, grid.rows);
     if points.len() != grid.len() {
-        return Err(format!(
-            "{} corners were recorded, and the target has {} ({columns} × {rows})",
-            points.len(),
-            grid.len()
+        return Err(text!(
+            "{recorded} corners were recorded, and the target has {count} ({columns} × {rows})",
+            recorded = points.len(),
+            count = grid.len(),
+            columns = columns,
+            rows = rows
         ));
     }
     let by_rows = |at: usize| at;
