@@ -189,6 +189,14 @@ fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut
     );
 }
 
+/// Settings that a person types; the others are chosen among what the data allow.
+const ARM: &str = "arm";
+const IMAGE_SIZE: &str = "image_size";
+
+fn is_typed(key: &str) -> bool {
+    matches!(key, ARM | IMAGE_SIZE)
+}
+
 /// A setting that a person types.
 struct Typed {
     key: &'static str,
@@ -202,7 +210,7 @@ impl Typed {
     /// The arm that makes poses of joint values.
     fn arm() -> Self {
         Self {
-            key: "arm",
+            key: ARM,
             label: text!("Arm"),
             example: "ur5e, robot.urdf",
             button: text!("Compute poses"),
@@ -213,7 +221,7 @@ impl Typed {
     /// How large the images were that corners are from.
     fn image_size() -> Self {
         Self {
-            key: "image_size",
+            key: IMAGE_SIZE,
             label: text!("Image size"),
             example: "1280x720",
             button: text!("Look again"),

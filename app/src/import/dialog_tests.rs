@@ -196,6 +196,16 @@ fn the_size_of_images_that_no_file_tells_is_typed() {
 }
 
 #[test]
+fn what_was_typed_is_not_offered_as_a_choice_as_well() {
+    let mut pane = driven(Some(two()), None);
+    for (key, value) in [("image_size", "640x480"), ("arm", "ur5e")] {
+        pane.model().import.as_deref_mut().expect("open").fixed.insert(key.to_owned(), value.to_owned());
+        pane.steps();
+        assert!(!pane.sees("Convention") && !pane.sees(value), "{key}");
+    }
+}
+
+#[test]
 fn a_recording_that_is_contradicted_or_not_read_says_why() {
     let why = Text::verbatim("image2.png fits the pose of poses.txt, row 3");
     let wrong = hypothesis(Mode::EyeInHand, Direction::Forward, &[why]);

@@ -23,7 +23,7 @@ pub fn differing(found: &Found) -> Vec<&'static str> {
 pub fn fixed_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language, outbox: &mut Outbox) {
     let open = differing(found);
     let all: Vec<_> = found.hypotheses().iter().flat_map(|h| h.conventions(&found.recording)).collect();
-    let fixed = import.fixed.keys().map(String::as_str).filter(|key| !open.contains(key) && *key != "arm");
+    let fixed = import.fixed.keys().map(String::as_str).filter(|key| !open.contains(key) && !super::is_typed(key));
     for key in open.iter().copied().chain(fixed) {
         let mut values: Vec<&str> = Vec::new();
         for convention in all.iter().filter(|convention| convention.key == key) {
