@@ -27,7 +27,6 @@ mod scene;
 pub mod serve;
 pub mod session;
 pub mod settings;
-mod shortfall;
 pub mod solve;
 pub mod target;
 pub mod taught;

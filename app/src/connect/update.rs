@@ -9,9 +9,9 @@ use handeye_sim_link::client::cell::CellPaths;
 use crate::app::App;
 use crate::connect::server_name;
 use crate::model::{ArmDoubt, BoardMotion, CellFacts, CellSource, Home, Link, LinkState, Motion, Severity, Trail};
+use crate::text;
 use crate::text::Text;
 use crate::worker::{CameraTask, ControlTask, Request, StopLine, Workers};
-use crate::{shortfall, text};
 
 /// Earlier addresses that are offered again.
 pub const ADDRESSES: usize = 8;
@@ -150,9 +150,6 @@ impl App {
     }
 
     pub(crate) fn cell_found(&mut self, facts: CellFacts) {
-        if let Some(shortfall) = shortfall::of(facts.support, facts.arm.is_some()) {
-            self.say(Severity::Warning, shortfall);
-        }
         let doubted = self.model.cell.as_ref().and_then(|before| before.arm_doubt);
         match facts.arm_doubt {
             Some(ArmDoubt::Foreign { distance_m, angle_rad }) => self.say(

@@ -3,7 +3,7 @@
 use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth, Support};
+use handeye_sim_link::client::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -22,8 +22,6 @@ pub struct CellFacts {
     /// Why that is not known of a chain of joints that a driver names.
     #[serde(default)]
     pub arm_doubt: Option<ArmDoubt>,
-    /// What works with the server's version.
-    pub support: Support,
     /// What a simulated cell publishes for comparison; never read by a solver.
     pub truth: Option<Truth>,
     /// Whether the camera measures depth.
@@ -72,7 +70,6 @@ impl CellFacts {
             nominal_intrinsics: Some(info.camera_intrinsics_nominal()),
             arm: arm.cloned(),
             arm_doubt: None,
-            support: info.support(),
             truth: truth.map(Truth::from),
             has_depth: true,
             moves: Moves::Freely,

@@ -11,7 +11,7 @@ use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish, Support};
+use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
 use nalgebra::Isometry3;
 
 use super::port::{
@@ -186,7 +186,6 @@ impl ControlPort for FakeCell {
             arm: ArmKinematics::ur5(Isometry3::identity(), Isometry3::identity(), &ArmKind::Ur5Coppeliasim.ranges())
                 .ok(),
             arm_doubt: None,
-            support: Support::Whole,
             truth: None,
             has_depth: true,
             moves: Moves::Freely,

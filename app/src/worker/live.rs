@@ -5,9 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use handeye_sim_link::cell::scene::SceneChoice;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
-use handeye_sim_link::client::{
-    BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, ProtocolVersion, SimulationState,
-};
+use handeye_sim_link::client::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, SimulationState};
 
 use super::cell_error::{check, check_arm, port_error};
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, Newest, PortError, RawFrame};
@@ -95,11 +93,8 @@ impl LiveConnector {
         if info.is_handeye_cell {
             return "Handeye cell".to_owned();
         }
-        match (info.program_version, info.protocol) {
-            (1.., _) => {
-                format!("CoppeliaSim {}", cell::version_name(info.program_version))
-            }
-            (_, ProtocolVersion::V1) => "CoppeliaSim up to 4.5".to_owned(),
+        match info.program_version {
+            1.. => format!("CoppeliaSim {}", cell::version_name(info.program_version)),
             _ => "remote API server".to_owned(),
         }
     }

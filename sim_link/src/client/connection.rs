@@ -9,8 +9,7 @@ use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::{CallOptions, ConnectionOptions};
 use super::protocol::{
-    self, ClientIds, END, EXECUTED, ProtocolVersion, REPEAT, REQUIRE, ReplyError, Sender, ServerMessage,
-    UNKNOWN_FUNCTION, WAIT,
+    self, ClientIds, END, EXECUTED, REPEAT, REQUIRE, ReplyError, Sender, ServerMessage, UNKNOWN_FUNCTION, WAIT,
 };
 use super::returned::Returned;
 use super::transport::{Transport, TransportFault, ZmqTransport};
@@ -40,7 +39,8 @@ pub struct Connection {
     introduced: bool,
     /// Names of the module are known to resolve, or were asked to: see [`Connection::converse`].
     loaded: bool,
-    version: Option<ProtocolVersion>,
+    /// The server has sent messages that can be read.
+    has_spoken: bool,
     contacted: bool,
     epoch: u64,
 }
@@ -94,7 +94,7 @@ impl Connection {
             uuid,
             introduced: false,
             loaded: false,
-            version: None,
+            has_spoken: false,
             contacted: false,
             epoch: 0,
         }
@@ -103,11 +103,6 @@ impl Connection {
     /// Where the server is.
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
-    }
-
-    /// The version that the server answered in; `None` before its first answer.
-    pub fn version(&self) -> Option<ProtocolVersion> {
-        self.version
     }
 
     /// Longest duration of a call that has no limit of its own.
@@ -179,7 +174,7 @@ impl Connection {
     /// Has the server forget this client, its stepping mode and its locks, and goes on as a new one.
     pub fn renew(&mut self) {
         self.contacted |= self.transport.connected();
-        if self.version != Some(ProtocolVersion::V1) && self.contacted {
+        if self.contacted {
             let farewell = protocol::request(END, Vec::new(), &self.sender(None));
             self.transport.send_last(&farewell);
         } else {
@@ -197,8 +192,6 @@ impl Connection {
     /// Servers after CoppeliaSim 4.10 know names of the module only once some client has had it loaded, and forget that
     /// when they are started again. So a name that is not known is asked for once more with the module loaded.
     fn converse(&mut self, exchange: &mut Exchange<'_>, args: Vec<Value>) -> Result<Vec<Value>, LinkError> {
-        // Kept for a server that turns out to speak the other version by now.
-        let mut retry = (self.version == Some(ProtocolVersion::V1)).then(|| args.clone());
         let mut message = self.request(exchange.func, args);
         // The request, to be sent again with the module loaded.
         let mut unloaded = (!self.loaded && exchange.func.starts_with(MODULE_PREFIX)).then(|| message.clone());
@@ -213,34 +206,23 @@ impl Connection {
                 continue;
             }
             match reply {
-                ServerMessage::Returned { values, version } => {
-                    self.version = Some(version);
+                ServerMessage::Returned { values } => {
                     self.loaded |= unloaded.is_some();
                     return Ok(values);
                 }
-                ServerMessage::Failed { message: text, version: ProtocolVersion::V2 }
-                    if unloaded.is_some() && text.starts_with(UNKNOWN_FUNCTION) =>
-                {
+                ServerMessage::Failed { message: text } if unloaded.is_some() && text.starts_with(UNKNOWN_FUNCTION) => {
                     loading = unloaded.take();
                     message = self.request(REQUIRE, vec![Value::from(MODULE)]);
                 }
                 // What a server says that does not know what it was asked to go on with.
-                ServerMessage::Failed { message: text, .. } if exchange.asked && text.contains(EXECUTED) => {
+                ServerMessage::Failed { message: text } if exchange.asked && text.contains(EXECUTED) => {
                     return Err(LinkError::Forgotten { call: exchange.func.to_owned() });
                 }
-                ServerMessage::Failed { message, version } => {
-                    self.version = Some(version);
+                ServerMessage::Failed { message } => {
                     return Err(LinkError::Remote { call: exchange.func.to_owned(), message });
                 }
-                ServerMessage::OtherVersion { message: text } => {
-                    // The call was not executed, so repeating it is safe.
-                    let Some(args) = retry.take() else {
-                        let call = exchange.func.to_owned();
-                        return Err(self.give_up(exchange, LinkError::VersionMismatch { call, reply: text }));
-                    };
-                    self.version = None;
-                    self.introduced = false;
-                    message = self.request(exchange.func, args);
+                ServerMessage::OldProtocol => {
+                    return Err(self.give_up(exchange, LinkError::TooOld { version: None }));
                 }
                 ServerMessage::Ask { func } if func == REPEAT => exchange.asked = true,
                 ServerMessage::Ask { func } => {
@@ -310,13 +292,14 @@ impl Connection {
     fn read(&mut self, exchange: &Exchange<'_>, bytes: &[u8]) -> Result<ServerMessage, LinkError> {
         let call = || exchange.func.to_owned();
         let error = match protocol::parse(bytes) {
-            Ok(message) => return Ok(message),
+            Ok(message) => {
+                self.has_spoken = true;
+                return Ok(message);
+            }
             Err(ReplyError::Wire(WireError::TooLarge { bytes })) => {
                 LinkError::ReplyTooLarge { call: call(), bytes: Some(bytes) }
             }
-            Err(ReplyError::Wire(source)) => {
-                LinkError::Malformed { call: call(), source, has_spoken: self.version.is_some() }
-            }
+            Err(ReplyError::Wire(source)) => LinkError::Malformed { call: call(), source, has_spoken: self.has_spoken },
             Err(ReplyError::Shape { expected, got }) => {
                 LinkError::UnexpectedReply { call: call(), expected: expected.to_owned(), got }
             }
@@ -325,9 +308,6 @@ impl Connection {
     }
 
     fn request(&mut self, func: &str, args: Vec<Value>) -> Vec<u8> {
-        if self.version == Some(ProtocolVersion::V1) {
-            return protocol::request_v1(func, args);
-        }
         let introduces = (!self.introduced).then_some("rust");
         self.introduced = true;
         protocol::request(func, args, &self.sender(introduces))
@@ -361,8 +341,8 @@ impl Connection {
             TransportFault::Refused(reason) => LinkError::Socket { endpoint: self.endpoint.to_string(), reason },
         };
         if matches!(error, LinkError::Disconnected { .. } | LinkError::OwnCellEnded { .. }) {
-            // Whatever comes back on that address may be a new server, of another version.
-            self.version = None;
+            // Whatever comes back on that address may be another server.
+            self.has_spoken = false;
             self.drop_exchange();
             return error;
         }
@@ -393,7 +373,7 @@ impl Connection {
 
 impl Drop for Connection {
     fn drop(&mut self) {
-        if self.version != Some(ProtocolVersion::V1) && self.contacted {
+        if self.contacted {
             let farewell = protocol::request(END, Vec::new(), &self.sender(None));
             self.transport.send_last(&farewell);
         }

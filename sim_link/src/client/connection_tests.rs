@@ -5,14 +5,6 @@ use super::*;
 use crate::client::testing::{Answer, Event, Log, args, ask, connection, err, func, ret};
 use crate::wire::{self, Reader};
 
-fn v1(values: Vec<Value>) -> Answer {
-    Answer::Say(wire::map([("success", Value::from(true)), ("ret", Value::Array(values))]))
-}
-
-fn v1_error(text: &str) -> Answer {
-    Answer::Say(wire::map([("success", Value::from(false)), ("error", Value::from(text))]))
-}
-
 fn has(request: &Value, key: &str) -> bool {
     request.get(key).is_some()
 }
@@ -36,7 +28,6 @@ fn only_the_first_message_introduces_the_client() {
         assert_eq!(request.get("timeout").and_then(Reader::integer), Some(8));
     }
     assert_eq!(requests[0].get("uuid"), requests[1].get("uuid"));
-    assert_eq!(connection.version(), Some(ProtocolVersion::V2));
 }
 
 #[test]
@@ -230,49 +221,21 @@ fn nonsense_is_named_and_the_next_call_works() {
     connection.call("sim.x", vec![]).expect("the next call works");
 }
 
+/// What CoppeliaSim 4.2 to 4.5 answer, whatever was called.
 #[test]
-fn an_old_server_is_recognised_and_spoken_to_in_its_version() {
-    let (mut connection, log) = connection(|request| match func(request) {
-        "zmqRemoteApi.require" => v1_error("No such function: zmqRemoteApi.require"),
-        _ => v1(vec![Value::from(1)]),
-    });
-    let error = connection.call("zmqRemoteApi.require", vec![Value::from("sim")]).expect_err("unknown there");
-    assert!(error.is_unknown_function(), "{error}");
-    assert_eq!(connection.version(), Some(ProtocolVersion::V1));
-    assert_eq!(connection.call("sim.setJointPosition", vec![]).expect("answered").integer(0), Ok(1));
-    let second = &log.requests()[1];
-    assert!(!has(second, "uuid") && !has(second, "argsL") && !has(second, "ver"), "{second:?}");
-    drop(connection);
-    assert_eq!(ended(&log), 0, "an old server does not know the farewell");
-}
-
-#[test]
-fn a_server_that_was_replaced_by_a_newer_one_is_spoken_to_in_the_newer_version() {
-    let mut turn = 0;
-    let (mut connection, log) = connection(move |request| {
-        turn += 1;
-        match turn {
-            1 => v1(vec![]),
-            _ if !has(request, "uuid") => {
-                v1_error("The client ZeroMQ remote API version does not match CoppeliaSim's version")
-            }
-            _ => ret([args(request)[0].clone()]),
-        }
-    });
-    connection.call("sim.x", vec![]).expect("answered by the old one");
-    let reply = connection.call("sim.y", vec![Value::from(9)]).expect("answered by the new one");
-    assert_eq!(reply.integer(0), Ok(9));
-    assert_eq!(connection.version(), Some(ProtocolVersion::V2));
-    assert_eq!(log.functions(), ["sim.x", "sim.y", "sim.y"]);
-}
-
-#[test]
-fn a_server_of_an_unknown_version_is_an_error_with_its_words() {
-    let text = "The client ZeroMQ remote API version does not match CoppeliaSim's version";
-    let (mut connection, log) = connection(move |_| v1_error(text));
-    let error = connection.call("sim.x", vec![]).expect_err("mismatch");
-    assert_eq!(error, LinkError::VersionMismatch { call: "sim.x".to_owned(), reply: text.to_owned() });
-    assert_eq!(log.requests().len(), 1, "asking again would go on for ever");
+fn a_server_of_protocol_1_is_too_old_whether_it_did_what_it_was_asked_or_not() {
+    let done = [("success", Value::from(true)), ("ret", Value::Array(vec![Value::from(40_501)]))];
+    let refused = [("success", Value::from(false)), ("error", Value::from("No such function: zmqRemoteApi.require"))];
+    for reply in [wire::map(done), wire::map(refused)] {
+        let (mut connection, log) = connection(move |_| Answer::Say(reply.clone()));
+        let error = connection.call("sim.getInt32Param", vec![Value::from(1)]).expect_err("too old");
+        assert_eq!(error, LinkError::TooOld { version: None });
+        assert_eq!(
+            error.to_string(),
+            "this is CoppeliaSim 4.5 or older, and 4.7 or newer is needed: update CoppeliaSim"
+        );
+        assert_eq!(log.requests().len(), 1, "nothing else is asked for");
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Numbers of the `sim.*` API that the client uses, as of CoppeliaSim 4.10; all of them hold since 4.2.
+//! Numbers of the `sim.*` API that the client uses, as of CoppeliaSim 4.10; all of them hold since 4.7.
 
 /// Stands for the world as a reference frame.
 pub const HANDLE_WORLD: i64 = -1;
@@ -33,10 +33,6 @@ pub const INT_PROGRAM_VERSION: i64 = 1;
 
 /// Stands for the whole scene as the base of a tree.
 pub const HANDLE_SCENE: i64 = -12;
-/// Float parameters of an object: the corner of its bounding box with the smallest coordinates, in its frame (m).
-pub const BOUNDS_MIN: [i64; 3] = [15, 16, 17];
-/// The corner with the largest coordinates.
-pub const BOUNDS_MAX: [i64; 3] = [18, 19, 20];
 
 /// Option of the name of an object: the shortest path that leads to it.
 pub const ALIAS_SHORTEST_PATH: i64 = 1;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use handeye_core::geometry::arm::JointQuantity;
 
-use super::cell::CellPart;
+use super::cell::{CellPart, version_name};
 use super::convert::ConvertError;
 use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
@@ -87,17 +87,6 @@ pub enum LinkError {
         /// The server's text, verbatim.
         message: String,
     },
-    /// The server speaks another protocol.
-    #[error(
-        "{call}: the server speaks another version of the remote API ({reply:?}); CoppeliaSim 4.6 or newer with its \
-         ZMQ remote API add-on is supported"
-    )]
-    VersionMismatch {
-        /// Which call.
-        call: String,
-        /// What the server said.
-        reply: String,
-    },
     /// The reply is not a message.
     #[error("{call}: the reply cannot be read: {source}; {advice}", advice = advice_on_bytes(*has_spoken))]
     Malformed {
@@ -122,7 +111,7 @@ pub enum LinkError {
         bytes: Option<usize>,
     },
     /// The reply is a message, but not one that the call can have.
-    #[error("{call}: expected {expected}, got {got}; check that the simulator is CoppeliaSim 4.6 or newer")]
+    #[error("{call}: expected {expected}, got {got}; check that the simulator is CoppeliaSim 4.7 or newer")]
     UnexpectedReply {
         /// Which call.
         call: String,
@@ -139,20 +128,18 @@ pub enum LinkError {
         /// What is wrong with it.
         source: ConvertError,
     },
-    /// The server is too old for anything.
-    #[error(
-        "CoppeliaSim {version} lacks functions that are needed for every task: use 4.6 or newer, and 4.7 for any arm"
-    )]
+    /// The server is older than everything that is supported.
+    #[error("this is CoppeliaSim {version}, and 4.7 or newer is needed: update CoppeliaSim", version = too_old(*version))]
     TooOld {
-        /// Its version.
-        version: String,
+        /// Its version, 40600 is 4.6.0; `None` where it speaks a protocol that ended with 4.5.
+        version: Option<i64>,
     },
-    /// The server is too old for the call.
+    /// The server lacks the call.
     #[error("{call} is not available on this server: it needs {needs}")]
     Unsupported {
         /// Which call.
         call: String,
-        /// From which version on.
+        /// What has it.
         needs: &'static str,
     },
     /// The scene lacks an object.
@@ -311,8 +298,8 @@ pub enum LinkError {
     },
     /// Image and pose could not be had for one and the same instant.
     #[error(
-        "the simulation moved on while a frame was read, {attempts} times in a row; pause it, or use CoppeliaSim 4.6 or \
-         newer, which can be held for the moment"
+        "another client moved the arm while a frame was read, {attempts} times in a row; end what it does, or try again \
+         when it is done"
     )]
     MixedInstants {
         /// How often it was tried.
@@ -382,6 +369,14 @@ fn listed(part: CellPart, there: &[String]) -> Text {
         return Text::default();
     }
     text!("; its {kind} are {there}", kind = part.kind().1, there = there.join(", "))
+}
+
+/// The version of a server that is too old.
+fn too_old(version: Option<i64>) -> Text {
+    match version {
+        Some(version) => Text::verbatim(version_name(version)),
+        None => text!("4.5 or older"),
+    }
 }
 
 fn standing(state: SimulationState) -> Text {

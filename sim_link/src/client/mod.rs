@@ -3,7 +3,7 @@
 //! | layer | what it knows |
 //! | --- | --- |
 //! | [`Transport`] | one request, one reply, and when the server is gone |
-//! | [`Connection`] | calls, both protocol versions, time limits, recovery |
+//! | [`Connection`] | calls, time limits, recovery |
 //! | [`Sim`] | functions of `sim.*` with their types; CoppeliaSim's conventions end in [`convert`] |
 //! | [`cell`] | an arm with a camera: move, stop, look, and the truth of a simulated cell |
 
@@ -26,7 +26,6 @@ pub use endpoint::{BadEndpoint, DEFAULT_PORT, Endpoint};
 pub use error::LinkError;
 pub use handeye_core::progress::CancelToken;
 pub use options::{CallOptions, ConnectionOptions};
-pub use protocol::ProtocolVersion;
 pub use returned::Returned;
 pub use sim::{
     JointInterval, MotionLimits, MotionState, MotionStatus, ObjectHandle, PoseMotion, SensorOptics, Sim,

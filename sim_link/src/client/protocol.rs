@@ -1,4 +1,4 @@
-//! Messages of the remote API, both versions: requests to bytes, bytes to what the server says.
+//! Messages of the remote API, version 2 of its protocol: requests to bytes, bytes to what the server says.
 
 use ciborium::Value;
 use rand::{RngExt as _, SeedableRng as _};
@@ -21,19 +21,8 @@ pub(super) const UNKNOWN_FUNCTION: &str = "No such function";
 /// Part of the error text for a path that leads to no object: "object does not exist, or alias/path is ill formatted" in
 /// newer versions, "Object does not exist" in older ones; in lower case.
 pub(super) const NO_SUCH_OBJECT: &str = "object does not exist";
-/// Part of the error text of a version 2 server for a request of version 1.
-const OTHER_VERSION: &str = "version does not match";
 
-/// Which version of the remote API a server speaks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ProtocolVersion {
-    /// CoppeliaSim 4.2 to 4.5.
-    V1,
-    /// CoppeliaSim 4.6 and newer.
-    V2,
-}
-
-/// Who sends a request of version 2.
+/// Who sends a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sender<'a> {
     /// The client's id.
@@ -45,7 +34,7 @@ pub(super) struct Sender<'a> {
     pub introduces: Option<&'static str>,
 }
 
-/// A request of version 2.
+/// A request.
 pub(super) fn request(func: &str, args: Vec<Value>, sender: &Sender<'_>) -> Vec<u8> {
     let count = args.len() as u64;
     let mut entries = vec![
@@ -63,20 +52,15 @@ pub(super) fn request(func: &str, args: Vec<Value>, sender: &Sender<'_>) -> Vec<
     wire::encode(&wire::map(entries))
 }
 
-/// A request of version 1.
-pub(super) fn request_v1(func: &str, args: Vec<Value>) -> Vec<u8> {
-    wire::encode(&wire::map([("func", Value::from(func)), ("args", Value::Array(args))]))
-}
-
 /// What a server says.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ServerMessage {
     /// The call is done.
-    Returned { values: Vec<Value>, version: ProtocolVersion },
+    Returned { values: Vec<Value> },
     /// The call failed, with the server's text.
-    Failed { message: String, version: ProtocolVersion },
-    /// A version 2 server found no client id in the request.
-    OtherVersion { message: String },
+    Failed { message: String },
+    /// The server speaks version 1 of the protocol, as CoppeliaSim 4.2 to 4.5 do.
+    OldProtocol,
     /// The client shall run a callback, wait, or repeat; with what arguments does not matter.
     Ask { func: String },
     /// An empty map: the reply to a farewell.
@@ -90,7 +74,7 @@ pub(super) enum ReplyError {
     Shape { expected: &'static str, got: String },
 }
 
-/// Reads a reply of either version.
+/// Reads a reply.
 ///
 /// # Errors
 /// [`ReplyError`]; never panics, whatever the bytes.
@@ -104,33 +88,19 @@ pub(super) fn parse(bytes: &[u8]) -> Result<ServerMessage, ReplyError> {
         let at = entries.iter().position(|(name, _)| name.text() == Some(key))?;
         Some(entries.swap_remove(at).1)
     };
-    if let Some(success) = take("success") {
-        return match success.boolean() {
-            Some(true) => {
-                let values = take("ret").map_or(Ok(Vec::new()), |ret| list(ret, "an array in `ret`"))?;
-                Ok(ServerMessage::Returned { values, version: ProtocolVersion::V1 })
-            }
-            Some(false) => {
-                let message = text(take("error").unwrap_or(Value::Null), "text in `error`")?;
-                Ok(if message.contains(OTHER_VERSION) {
-                    ServerMessage::OtherVersion { message }
-                } else {
-                    ServerMessage::Failed { message, version: ProtocolVersion::V1 }
-                })
-            }
-            None => Err(shape("a boolean in `success`", &success)),
-        };
+    // Whether the call succeeded stands in replies of version 1 alone.
+    if take("success").is_some() {
+        return Ok(ServerMessage::OldProtocol);
     }
     if let Some(func) = take("func") {
         let func = text(func, "text in `func`")?;
         return Ok(ServerMessage::Ask { func });
     }
     if let Some(err) = take("err") {
-        return Ok(ServerMessage::Failed { message: text(err, "text in `err`")?, version: ProtocolVersion::V2 });
+        return Ok(ServerMessage::Failed { message: text(err, "text in `err`")? });
     }
     if let Some(ret) = take("ret") {
-        let values = list(ret, "an array in `ret`")?;
-        return Ok(ServerMessage::Returned { values, version: ProtocolVersion::V2 });
+        return Ok(ServerMessage::Returned { values: list(ret, "an array in `ret`")? });
     }
     if empty {
         return Ok(ServerMessage::Nothing);

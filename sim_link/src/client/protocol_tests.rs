@@ -26,7 +26,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 
 fn returned(hex: &str) -> Vec<Value> {
     match parse(&bytes(hex)) {
-        Ok(ServerMessage::Returned { values, version: ProtocolVersion::V2 }) => values,
+        Ok(ServerMessage::Returned { values }) => values,
         other => panic!("{other:?}"),
     }
 }
@@ -122,7 +122,7 @@ fn the_recorded_info_map_is_read() {
 #[test]
 fn recorded_errors_keep_their_text() {
     let failed = |hex| match parse(&bytes(hex)) {
-        Ok(ServerMessage::Failed { message, version: ProtocolVersion::V2 }) => message,
+        Ok(ServerMessage::Failed { message }) => message,
         other => panic!("{other:?}"),
     };
     let missing = failed(
@@ -142,27 +142,21 @@ fn recorded_requests_of_the_server_are_read() {
 }
 
 #[test]
-fn the_refusal_of_an_old_client_is_told_from_a_failed_call() {
+fn replies_of_protocol_1_are_told_from_all_others() {
     let text = "The client ZeroMQ remote API version does not match CoppeliaSim's version";
-    let refusal = wire::encode(&wire::map([("error", Value::from(text)), ("success", Value::from(false))]));
-    assert_eq!(refusal[..7], bytes("a2 65 6572726f72")[..]);
-    assert_eq!(parse(&refusal), Ok(ServerMessage::OtherVersion { message: text.to_owned() }));
-
-    let failed = wire::map([("success", Value::from(false)), ("error", Value::from("No such function: sim.x"))]);
-    let message = "No such function: sim.x".to_owned();
-    assert_eq!(parse(&wire::encode(&failed)), Ok(ServerMessage::Failed { message, version: ProtocolVersion::V1 }));
+    let refused = wire::encode(&wire::map([("error", Value::from(text)), ("success", Value::from(false))]));
+    assert_eq!(refused[..7], bytes("a2 65 6572726f72")[..]);
     let done = wire::map([("success", Value::from(true)), ("ret", Value::Array(vec![Value::from(1)]))]);
-    assert_eq!(
-        parse(&wire::encode(&done)),
-        Ok(ServerMessage::Returned { values: vec![Value::from(1)], version: ProtocolVersion::V1 })
-    );
+    for reply in [refused, wire::encode(&done)] {
+        assert_eq!(parse(&reply), Ok(ServerMessage::OldProtocol));
+    }
 }
 
 #[test]
 fn text_that_came_as_bytes_is_still_a_message() {
     let reply = wire::map([("err", Value::Bytes(b"caf\xe9".to_vec()))]);
     match parse(&wire::encode(&reply)) {
-        Ok(ServerMessage::Failed { message, .. }) => assert_eq!(message, "caf\u{fffd}"),
+        Ok(ServerMessage::Failed { message }) => assert_eq!(message, "caf\u{fffd}"),
         other => panic!("{other:?}"),
     }
 }
@@ -228,7 +222,7 @@ mod slow {
                 }
             }
             // Whatever is understood must also survive being read as a result.
-            if let Ok(ServerMessage::Returned { values, .. }) = parse(&reply) {
+            if let Ok(ServerMessage::Returned { values }) = parse(&reply) {
                 let returned = crate::client::Returned::new("fuzz", values);
                 let _outcome = (returned.number(0), returned.text(0), returned.blob(0), returned.resolution(1));
                 let _outcome = returned.pose::<(), ()>(0);

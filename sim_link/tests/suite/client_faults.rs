@@ -7,9 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ciborium::Value;
-use handeye_sim_link::client::{
-    CallOptions, CancelToken, Connection, ConnectionOptions, Endpoint, LinkError, ProtocolVersion,
-};
+use handeye_sim_link::client::{CallOptions, CancelToken, Connection, ConnectionOptions, Endpoint, LinkError};
 use handeye_sim_link::wire::{self, MAX_MESSAGE_BYTES, Reader as _};
 
 /// Longest wait of a test for something that takes milliseconds; only a failure takes so long.
@@ -182,18 +180,6 @@ fn garbage_is_named_and_the_next_call_works() {
     assert!(matches!(error, LinkError::UnexpectedReply { .. }), "{error}");
     assert_eq!(connection.call("sim.x", vec![]).expect("answered").integer(0), Ok(1));
     drop(connection);
-    join(server);
-}
-
-#[test]
-fn a_server_of_another_version_is_named() {
-    let text = "The client ZeroMQ remote API version does not match CoppeliaSim's version";
-    let (endpoint, server) = serve(move |peer| {
-        let (to, _) = peer.next();
-        peer.say(&to, &wire::map([("success", Value::from(false)), ("error", Value::from(text))]));
-    });
-    let error = connect(&endpoint, options()).call("sim.x", vec![]).expect_err("mismatch");
-    assert!(matches!(&error, LinkError::VersionMismatch { reply, .. } if reply == text), "{error}");
     join(server);
 }
 
@@ -479,25 +465,6 @@ fn a_request_that_the_server_could_not_take_is_repeated_unchanged() {
     });
     let mut connection = connect(&endpoint, options());
     assert_eq!(connection.call("sim.x", vec![Value::from(1)]).expect("done").integer(0), Ok(2));
-    drop(connection);
-    join(server);
-}
-
-#[test]
-fn an_old_server_is_spoken_to_in_its_version() {
-    let (endpoint, server) = serve(|peer| {
-        let (to, first) = peer.next();
-        assert_eq!(func(&first), "zmqRemoteApi.require");
-        let text = "No such function: zmqRemoteApi.require";
-        peer.say(&to, &wire::map([("success", Value::from(false)), ("error", Value::from(text))]));
-        let (to, second) = peer.next();
-        assert!(second.get("uuid").is_none(), "version 1 has no client ids");
-        peer.say(&to, &wire::map([("success", Value::from(true)), ("ret", Value::Array(vec![Value::from(28)]))]));
-    });
-    let mut connection = connect(&endpoint, options());
-    assert!(connection.call("zmqRemoteApi.require", vec![Value::from("sim")]).is_err());
-    assert_eq!(connection.version(), Some(ProtocolVersion::V1));
-    assert_eq!(connection.call("sim.getObject", vec![Value::from("/UR5")]).expect("done").integer(0), Ok(28));
     drop(connection);
     join(server);
 }

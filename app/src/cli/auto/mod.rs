@@ -25,7 +25,6 @@ use crate::cli::auto::sequence::PoseSequence;
 use crate::model::{CaptureOptions, Goal, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
 use crate::session::start;
-use crate::shortfall;
 use crate::text::Language;
 use crate::worker::{timestamp, timestamp_rfc3339};
 use guided::GuidedSequence;
@@ -203,9 +202,6 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let around = surroundings(cell.arm(), kinematics.as_ref(), is_guided || plans_here, keep_out)?;
     if plans_here {
         plan = Plan::planned_here(cell.arm(), kinematics.as_ref(), &truth, &around, seed)?;
-    }
-    if let Some(shortfall) = shortfall::of(cell.info().support(), kinematics.is_some()) {
-        tracing::warn!("{}", shortfall.say(Language::English));
     }
     let meta = SessionMeta {
         seeds: args.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),

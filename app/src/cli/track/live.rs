@@ -24,7 +24,6 @@ use crate::limits;
 use crate::model::{FollowStatus, FollowWish, Step, Tracked};
 use crate::rerun_log::{Entry, Recorder};
 use crate::session::start::REFERENCE_POSES;
-use crate::shortfall;
 use crate::text::Language;
 use crate::worker::{FollowLine, TrackedImage, Tracking, end_of_following};
 
@@ -123,9 +122,6 @@ impl Live {
     pub fn connect(endpoint: &Endpoint, paths: &CellPaths, is_own: bool) -> Result<Self, Failure> {
         let options = if is_own { ConnectionOptions::own_cell() } else { ConnectionOptions::default() };
         let cell = CellClient::connect(endpoint, &options, paths).map_err(Failure::failed)?;
-        if let Some(shortfall) = shortfall::of(cell.info().support(), true) {
-            tracing::warn!("{}", shortfall.say(Language::English));
-        }
         let (arm, feed) = cell.split();
         Ok(Self { arm, feed })
     }

@@ -2,7 +2,7 @@
 
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::cell::{ArmKinematics, Support};
+use handeye_sim_link::client::cell::ArmKinematics;
 use handeye_sim_link::driver::message::Ability;
 use handeye_sim_link::driver::{ChainPlacement, Driver, DriverCell, LogLevel};
 
@@ -53,7 +53,6 @@ impl ControlPort for DriverControl {
                 ChainPlacement::Open { .. } => Some(ArmDoubt::Open),
                 ChainPlacement::Foreign { distance_m, angle_rad } => Some(ArmDoubt::Foreign { distance_m, angle_rad }),
             },
-            support: Support::Whole,
             truth: None,
             has_depth: camera.is_some_and(|hello| hello.can(Ability::Depth)),
             moves: match (&self.typed, robot.can(Ability::MoveJoints), robot.can(Ability::MoveTip)) {

@@ -18,7 +18,7 @@ use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_core::targets::observation::{Corner, View};
 use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
 use handeye_core::verify::{self, CheckCapture, Predictor};
-use handeye_sim_link::client::cell::{ArmKinematics, Support};
+use handeye_sim_link::client::cell::ArmKinematics;
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
@@ -138,7 +138,6 @@ pub fn connected() -> Model {
         nominal_intrinsics: Some(intrinsics()),
         arm: Some(arm()),
         arm_doubt: None,
-        support: Support::Whole,
         truth: Some(Truth {
             tip_from_camera: tip_from_camera(),
             base_from_target: Some(base_from_target()),

@@ -7,7 +7,6 @@ use handeye_core::geometry::arm::{JointKind, JointValues};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::progress::CancelToken;
 
-use super::hold::Hold;
 use super::joint_elsewhere::joint_elsewhere;
 use super::joints::{largest_change, of_rad, read_joint_values};
 use super::objects::CellObjects;
@@ -72,14 +71,13 @@ pub struct Arm {
     pub(super) sim: Sim,
     pub(super) objects: Arc<CellObjects>,
     pub(super) info: Arc<CellInfo>,
-    pub(super) hold: Hold,
     /// What its motions keep clear of.
     pub(super) among: Option<Arc<Among>>,
 }
 
 impl Arm {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
-        Self { sim, objects, info, hold: Hold::default(), among: None }
+        Self { sim, objects, info, among: None }
     }
 
     /// Connects once, for an arm without its camera.

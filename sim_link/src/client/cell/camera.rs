@@ -8,7 +8,7 @@ use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
 
-use super::hold::Hold;
+use super::hold::Held;
 use super::joints::read_joint_values;
 use super::objects::CellObjects;
 use super::truth::{self, GroundTruth, ShownMoment};
@@ -18,7 +18,7 @@ use crate::client::error::LinkError;
 use crate::client::options::ConnectionOptions;
 use crate::client::sim::{ObjectHandle, Sim};
 
-/// How often a frame is read again because the simulation moved on meanwhile.
+/// How often a frame is read again because another client moved the arm meanwhile.
 const ATTEMPTS: u32 = 10;
 
 /// Everything about one instant of the cell.
@@ -46,7 +46,6 @@ pub struct CameraFeed {
     sim: Sim,
     objects: Arc<CellObjects>,
     info: Arc<CellInfo>,
-    hold: Hold,
     /// Whether the server takes images on request, as far as is known.
     renews: bool,
     /// Whether the server tells what its images show, as far as is known.
@@ -56,7 +55,7 @@ pub struct CameraFeed {
 impl CameraFeed {
     pub(super) fn new(sim: Sim, objects: Arc<CellObjects>, info: Arc<CellInfo>) -> Self {
         let tells_moment = info.is_handeye_cell;
-        Self { sim, objects, info, hold: Hold::default(), renews: !tells_moment, tells_moment }
+        Self { sim, objects, info, renews: !tells_moment, tells_moment }
     }
 
     /// Connects once, for a camera without its arm.
@@ -85,23 +84,15 @@ impl CameraFeed {
     /// elsewhere since is in the pose and not yet in the image. A built-in cell tells instead what it was that the images
     /// of the last pass show, board included, and all of the frame is of the end of that pass.
     ///
-    /// A server that cannot be held is read until the clock says the same before and after; there, and where images
-    /// cannot be asked for, [`Frame::image_age_s`] says how much older than the pose they may be.
+    /// Where images cannot be asked for, [`Frame::image_age_s`] says how much older than the pose they may be.
     ///
     /// # Errors
-    /// [`LinkError::MixedInstants`] when the simulation is never still for long enough; otherwise as for any call.
+    /// [`LinkError::MixedInstants`] when another client moves the arm meanwhile, again and again; otherwise as for any
+    /// call.
     pub fn grab(&mut self) -> Result<Frame, LinkError> {
-        if let Some(held) = self.hold.acquire(&mut self.sim)? {
-            let outcome = self.read_held();
-            return held.release(&mut self.sim, outcome);
-        }
-        for _ in 0..ATTEMPTS {
-            let frame = self.read(self.info.time_step_s)?;
-            if self.sim.get_simulation_time()? == frame.sim_time_s {
-                return Ok(frame);
-            }
-        }
-        Err(LinkError::MixedInstants { attempts: ATTEMPTS })
+        let held = Held::acquire(&mut self.sim)?;
+        let outcome = self.read_held();
+        held.release(&mut self.sim, outcome)
     }
 
     /// All of one instant while time stands. Requests of other clients are served meanwhile, so one that moves the arm may
@@ -167,7 +158,6 @@ impl CameraFeed {
     }
 
     fn read_present(&mut self, image_age_s: f64) -> Result<Frame, LinkError> {
-        // Time first: without a hold it is compared with the time after everything else.
         Ok(Frame {
             image_age_s,
             sim_time_s: self.sim.get_simulation_time()?,

@@ -31,9 +31,9 @@ mod room;
 mod sentinel;
 mod served;
 mod stream;
-mod support;
 mod surroundings;
 mod truth;
+mod version;
 mod views;
 
 use std::sync::Arc;
@@ -55,9 +55,9 @@ pub use joints::{CellJoint, RAD_PER_M};
 pub use paths::{BadCellPath, CellPart, CellPaths};
 pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
-pub use support::{Support, version_name};
 pub use surroundings::{Among, Standing};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
+pub use version::version_name;
 pub use views::BoardInView;
 
 use objects::CellObjects;
@@ -65,7 +65,6 @@ use objects::CellObjects;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
 use super::options::ConnectionOptions;
-use super::protocol::ProtocolVersion;
 use super::sim::{SensorOptics, Sim, SimulationState};
 
 /// What is known about a cell once it has been found.
@@ -73,8 +72,6 @@ use super::sim::{SensorOptics, Sim, SimulationState};
 pub struct CellInfo {
     /// Where the server is.
     pub endpoint: Endpoint,
-    /// Version of the remote API.
-    pub protocol: ProtocolVersion,
     /// Version of the simulator, 41000 is 4.10.0; 0 when it does not tell.
     pub program_version: i64,
     /// Whether it is a cell of this project, which CoppeliaSim's version number does not tell.
@@ -100,7 +97,8 @@ impl CellClient {
     /// Connects twice and finds the objects of the scene.
     ///
     /// # Errors
-    /// [`LinkError::NoSuchObject`] names the first object that is missing; otherwise as for any call.
+    /// [`LinkError::TooOld`] before CoppeliaSim 4.7; [`LinkError::NoSuchObject`] names the first object that is missing;
+    /// otherwise as for any call.
     pub fn connect(endpoint: &Endpoint, options: &ConnectionOptions, paths: &CellPaths) -> Result<Self, LinkError> {
         let control = Sim::connect(endpoint, options.clone())?;
         // Two clients with one id would share one record on the server.
@@ -151,11 +149,6 @@ impl CellInfo {
         self.optics.intrinsics()
     }
 
-    /// What works with the server.
-    pub fn support(&self) -> Support {
-        Support::of(self.protocol, self.program_version)
-    }
-
     /// How each joint moves, from the base up.
     pub fn joint_kinds(&self) -> impl Iterator<Item = JointKind> {
         self.joints.iter().map(|joint| joint.kind)
@@ -169,7 +162,6 @@ impl CellInfo {
         }
         Ok(Self {
             endpoint: sim.connection().endpoint().clone(),
-            protocol: sim.connection().version().unwrap_or(ProtocolVersion::V2),
             program_version,
             is_handeye_cell: truth::is_published(sim)?,
             joints,
@@ -191,9 +183,9 @@ fn discover(
     Ok((sim, objects, info))
 }
 
-/// The version first: an old server lacks what the rest asks for.
+/// The version first: a server that is too old lacks what the rest asks for.
 fn look_around(sim: &mut Sim, paths: &CellPaths) -> Result<(Arc<CellObjects>, Arc<CellInfo>), LinkError> {
-    let program_version = support::program_version(sim)?;
+    let program_version = version::program_version(sim)?;
     let objects = CellObjects::find(sim, paths)?;
     let info = CellInfo::read(sim, &objects, program_version)?;
     Ok((Arc::new(objects), Arc::new(info)))

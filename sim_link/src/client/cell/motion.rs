@@ -311,8 +311,7 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::move_to_joints`]; [`LinkError::Unreached`] when the tip is elsewhere, [`LinkError::NotSettled`] when it
-    /// does not come to rest; where the server moves it, [`LinkError::NoSuchObject`] in a scene without a target dummy
-    /// and [`LinkError::Unsupported`] before CoppeliaSim 4.7.
+    /// does not come to rest; where the server moves it, [`LinkError::NoSuchObject`] in a scene without a target dummy.
     pub fn move_to_pose(
         &mut self,
         goal: &Pose<Base, Tip>,

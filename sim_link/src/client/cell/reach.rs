@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Matrix6xX, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::Arm;
+use super::hold::Held;
 use super::joints::{CellJoint, read_joint_values};
 use super::objects::{Carriers, CellObjects};
 use crate::client::error::LinkError;
@@ -227,13 +228,9 @@ impl Arm {
             return Ok(Err(UnknownKinematics::OtherJoints));
         }
         for _ in 0..ATTEMPTS {
-            let held = self.hold.acquire(&mut self.sim)?;
+            let held = Held::acquire(&mut self.sim)?;
             let measured = measure(&mut self.sim, &self.objects, arm);
-            let measured = match held {
-                Some(held) => held.release(&mut self.sim, measured)?,
-                None => measured?,
-            };
-            if let Some(measured) = measured {
+            if let Some(measured) = held.release(&mut self.sim, measured)? {
                 let joints = &self.info.joints;
                 let known = if measured.is_ur5(joints) { measured.ur5(joints) } else { measured.chain(joints) };
                 return Ok(known.map_err(UnknownKinematics::NoChain));

@@ -14,6 +14,7 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 
 use super::Arm;
 use super::arm::clock_past;
+use super::hold::Held;
 use super::joints::{difference_rad, read_joint_values};
 use super::sentinel::Sentinel;
 use crate::client::error::LinkError;
@@ -136,15 +137,12 @@ impl Stream {
         next: impl FnOnce(&Slot) -> Point,
     ) -> Result<Pass, LinkError> {
         // All joints go to a point in the same pass, however slow the network.
-        let lock = arm.hold.acquire(&mut arm.sim)?;
+        let held = Held::acquire(&mut arm.sim)?;
         let pass = self.sentinel.is_stopped(&mut arm.sim).and_then(|now| {
             self.is_stopped |= now;
             self.send(arm, next)
         });
-        let pass = match lock {
-            Some(lock) => lock.release(&mut arm.sim, pass)?,
-            None => pass?,
-        };
+        let pass = held.release(&mut arm.sim, pass)?;
         // A point takes effect in the pass that follows, also the last one.
         arm.sim.step(wait)?;
         Ok(pass)

@@ -7,6 +7,7 @@ use handeye_core::plan::{self as planning, Contact, Guard, Obstacle, Surrounding
 use nalgebra::{Isometry3, Point3};
 
 use super::Arm;
+use super::hold::Held;
 use super::reach::ArmKinematics;
 use crate::client::error::LinkError;
 use crate::client::sim::{ObjectHandle, Sim};
@@ -88,41 +89,26 @@ impl Arm {
     /// What stands around in the scene: a box about each shape, where it is now; what hangs on the board apart. Not among them are
     /// the arm with all that hangs on it, the board itself, and boxes that the foot of the arm stands in, as of a cage: what is in those is not known from their
     /// outside, and they are named in the log. Kept are the 500 nearest within 3 m of the foot of the arm; of more than 2,000
-    /// shapes the rest is left out, which the log says too. A camera beside the robot counts as any other shape. Of a server that
-    /// does not tell how large shapes are only the plane under the arm is known, and the log says so.
+    /// shapes the rest is left out, which the log says too. A camera beside the robot counts as any other shape. One whose size the
+    /// server does not tell is left out, which the log says.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
     pub fn surroundings(&mut self, kinematics: &ArmKinematics) -> Result<Standing, LinkError> {
-        let held = self.hold.acquire(&mut self.sim)?;
+        let held = Held::acquire(&mut self.sim)?;
         let (arm, board) = (self.objects.arm.or_else(|| self.objects.joints.first().copied()), self.objects.board);
         let found = read(&mut self.sim, arm, board, kinematics);
-        let found = match held {
-            Some(held) => held.release(&mut self.sim, found)?,
-            None => found?,
-        };
-        Ok(found.unwrap_or_else(|| {
-            tracing::warn!(
-                "the simulator does not tell how large the shapes of the scene are: of what stands around only the plane \
-                 under the arm is known"
-            );
-            Standing { around: kinematics.plane(), on_board: Vec::new() }
-        }))
+        held.release(&mut self.sim, found)
     }
 }
 
-/// `None` from a server that lacks the calls.
 fn read(
     sim: &mut Sim,
     arm: Option<ObjectHandle>,
     board: Option<ObjectHandle>,
     kinematics: &ArmKinematics,
-) -> Result<Option<Standing>, LinkError> {
-    let shapes = match sim.get_shapes(None) {
-        Ok(shapes) => shapes,
-        Err(LinkError::Remote { .. } | LinkError::UnexpectedReply { .. }) => return Ok(None),
-        Err(error) => return Err(error),
-    };
+) -> Result<Standing, LinkError> {
+    let shapes = sim.get_shapes(None)?;
     let mut own: HashSet<ObjectHandle> = board.into_iter().collect();
     if let Some(arm) = arm {
         own.extend(sim.get_shapes(Some(arm))?);
@@ -141,9 +127,10 @@ fn read(
     let mut boxes: Vec<(f64, bool, Obstacle)> = Vec::new();
     for shape in shapes.into_iter().take(MOST_SHAPES) {
         let Some(found) = sim.get_shape_box(shape)? else {
-            if boxes.is_empty() {
-                return Ok(None);
-            }
+            tracing::warn!(
+                "the simulator does not tell how large the shape {} is: the arm is not kept clear of it",
+                shape.0
+            );
             continue;
         };
         let base_from_shape = *sim.get_object_pose::<Base, Base>(shape, ObjectHandle::WORLD)?.isometry();
@@ -182,5 +169,5 @@ fn read(
             standing.around.obstacles.push(obstacle);
         }
     }
-    Ok(Some(standing))
+    Ok(standing)
 }

@@ -302,7 +302,7 @@ fn pose_limits() -> MotionLimits {
 fn the_reference_scene_is_discovered() {
     let cell = cell(world());
     let info = cell.client.info();
-    assert_eq!((info.program_version, info.protocol, info.time_step_s), (41000, ProtocolVersion::V2, 0.05));
+    assert_eq!((info.program_version, info.time_step_s), (41000, 0.05));
     assert_eq!((info.optics.width, info.optics.height, info.depth_optics.far_m), (4, 2, 3.5));
     assert_relative_eq!(info.joints[5].range.max, 3.5, epsilon = 1e-12);
     // f = 2 / tan(0.5)
@@ -310,18 +310,17 @@ fn the_reference_scene_is_discovered() {
 }
 
 #[test]
-fn a_simulator_that_is_too_old_is_told_so_before_anything_else_is_asked() {
+fn a_simulator_that_is_too_old_is_refused_before_anything_else_is_asked() {
     let world = world();
-    edit(&world, |w| w.version = 40_400);
+    edit(&world, |w| w.version = 40_699);
     let (client, control, _) = try_cell(&world);
-    let error = client.err().expect("4.4 has no resolution of a vision sensor");
-    assert!(error.to_string().contains("CoppeliaSim 4.4.0 lacks"), "{error}");
+    assert_eq!(client.err(), Some(LinkError::TooOld { version: Some(40_699) }));
     assert_eq!(control.functions(), ["sim.getInt32Param"]);
-
-    let support = |version| Support::of(ProtocolVersion::V2, version);
-    assert_eq!(Support::of(ProtocolVersion::V1, 40_501), Support::AtRest);
-    assert_eq!(support(40_600), Support::KnownArms);
-    assert!([40_700, 41_000, 0].map(support).iter().all(|support| *support == Support::Whole));
+    // One that does not tell is no CoppeliaSim.
+    for version in [40_700, 41_000, 0] {
+        edit(&world, |w| w.version = version);
+        assert_eq!(try_cell(&world).0.err(), None, "{version}");
+    }
 }
 
 #[test]
@@ -560,18 +559,6 @@ fn a_frame_is_of_one_instant_because_the_simulation_is_held() {
     assert_eq!((cell.world().handled, frame.image_age_s), (1, 0.0), "the images show the joints of now");
     assert_eq!((frame.rgb.dimensions(), frame.depth.width, frame.depth.height), ((4, 2), 4, 2));
     assert_eq!(frame.rgb.get_pixel(0, 0).0, [12, 13, 14], "the second row of the buffer is the upper one");
-}
-
-#[test]
-fn without_a_hold_a_frame_is_read_again_until_the_clock_stands() {
-    let world = world();
-    edit(&world, |w| w.missing.push("sim.acquireLock"));
-    let mut cell = cell(world);
-    let frame = cell.client.camera().grab().expect("the clock stands");
-    assert_eq!(frame.image_age_s, 0.05, "of the pass before, perhaps");
-    cell.world().passes_per_image = 1;
-    let error = cell.client.camera().grab().expect_err("the clock runs");
-    assert!(matches!(error, LinkError::MixedInstants { .. }), "{error}");
 }
 
 #[test]

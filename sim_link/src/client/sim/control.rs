@@ -9,7 +9,6 @@ use super::simulation_state::SimulationState;
 use crate::client::constants::INT_PROGRAM_VERSION;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
-use crate::client::protocol::ProtocolVersion;
 
 /// How long the end of a simulation is waited for: it takes some three passes, and those of a large scene are slow.
 const END: Duration = Duration::from_secs(10);
@@ -101,10 +100,6 @@ impl Sim {
     /// # Errors
     /// Any [`LinkError`] of a call.
     pub fn set_stepping(&mut self, enable: bool) -> Result<(), LinkError> {
-        if self.connection.version() == Some(ProtocolVersion::V1) {
-            let args = vec![Value::from(enable), Value::from(self.connection.uuid())];
-            return self.call("setStepping", args).map(drop);
-        }
         self.call("sim.setStepping", vec![Value::from(enable)]).map(drop)
     }
 
@@ -114,30 +109,7 @@ impl Sim {
     /// # Errors
     /// Any [`LinkError`] of a call.
     pub fn step(&mut self, options: &CallOptions) -> Result<(), LinkError> {
-        if self.connection.version() == Some(ProtocolVersion::V1) {
-            return self.step_v1(options);
-        }
         self.call_with("sim.step", Vec::new(), options).map(drop)
-    }
-
-    /// A server of version 1 announces the end of a pass on a second socket. Its clock says the same.
-    fn step_v1(&mut self, options: &CallOptions) -> Result<(), LinkError> {
-        let started = std::time::Instant::now();
-        let before = self.get_simulation_time()?;
-        if self.get_simulation_state()? != SimulationState::Running {
-            return Ok(());
-        }
-        let uuid = Value::from(self.connection.uuid());
-        self.call_with("step", vec![uuid], options)?;
-        let limit = options.total_timeout.unwrap_or_else(|| self.connection.total_timeout());
-        while self.call_with("sim.getSimulationTime", Vec::new(), options)?.number(0)? == before
-            && self.get_simulation_state()? == SimulationState::Running
-        {
-            if started.elapsed() > limit {
-                return Err(LinkError::Timeout { call: "step".to_owned(), after: started.elapsed() });
-            }
-        }
-        Ok(())
     }
 
     /// Holds the simulation where it is until [`Sim::release_lock`], so that several calls see the same instant.

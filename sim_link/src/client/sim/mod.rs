@@ -1,7 +1,6 @@
 //! The part of `sim.*` that the workbench uses, typed.
 //!
-//! Reference frames are always passed, and setters take `(object, frame, value)`: the order and the arity that every
-//! version from 4.5 on accepts. What setters return (1 in version 1 of the protocol) is ignored.
+//! Reference frames are always passed, and setters take `(object, frame, value)`: an order that every version accepts.
 
 mod control;
 mod motion;

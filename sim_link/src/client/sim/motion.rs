@@ -8,11 +8,8 @@ use crate::client::constants::{MOTION_DONE, MOTION_RUNNING, MOTION_STOPPED};
 use crate::client::convert::seven_from_pose;
 use crate::client::error::LinkError;
 use crate::client::options::CallOptions;
-use crate::client::protocol::ProtocolVersion;
+use crate::client::returned::Returned;
 use crate::wire;
-
-/// The version that has motions with a map of parameters.
-const NEEDS: &str = "CoppeliaSim 4.7 or newer";
 
 const MOVE: &str = "sim.moveToPose";
 const INIT: &str = "sim.moveToPose_init";
@@ -105,7 +102,7 @@ impl Sim {
     /// tip with the goal afterwards.
     ///
     /// # Errors
-    /// [`LinkError::Unsupported`] before CoppeliaSim 4.7.
+    /// [`LinkError::BadMotion`] for limits that are none; otherwise as for any call.
     pub fn move_to_pose(&mut self, motion: &PoseMotion, options: &CallOptions) -> Result<(), LinkError> {
         self.motion_call(MOVE, motion, options).map(drop)
     }
@@ -113,7 +110,7 @@ impl Sim {
     /// Prepares [`Sim::move_to_pose`] to be done step by step.
     ///
     /// # Errors
-    /// [`LinkError::Unsupported`] before CoppeliaSim 4.7.
+    /// [`LinkError::BadMotion`] for limits that are none; otherwise as for any call.
     pub fn move_to_pose_init(&mut self, motion: &PoseMotion) -> Result<MotionState, LinkError> {
         self.motion_call(INIT, motion, &CallOptions::default())?.into_map(0).map(MotionState)
     }
@@ -143,19 +140,8 @@ impl Sim {
         self.call(CLEANUP, vec![state.0]).map(drop)
     }
 
-    /// In version 1 of the protocol motions were part of the vendor's clients, not of the server.
-    fn motion_call(
-        &mut self,
-        func: &str,
-        motion: &PoseMotion,
-        options: &CallOptions,
-    ) -> Result<crate::client::Returned, LinkError> {
+    fn motion_call(&mut self, func: &str, motion: &PoseMotion, options: &CallOptions) -> Result<Returned, LinkError> {
         motion.limits.validate(4)?;
-        let unsupported = || LinkError::Unsupported { call: func.to_owned(), needs: NEEDS };
-        if self.connection.version() == Some(ProtocolVersion::V1) {
-            return Err(unsupported());
-        }
         self.call_with(func, vec![motion.to_value()], options)
-            .map_err(|error| if error.is_unknown_function() { unsupported() } else { error })
     }
 }

@@ -208,7 +208,7 @@ impl Sim {
 
     /// Puts a joint at a position (rad, or m of a prismatic joint) at once. The simulator clamps to its interval.
     ///
-    /// `false` if the joint stays where it is: from CoppeliaSim 4.7 on one that a target position moves takes no other.
+    /// `false` if the joint stays where it is: one that a target position moves takes no other.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.

@@ -1,11 +1,8 @@
-use std::time::Duration;
-
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use nalgebra::Vector3;
 
 use super::*;
-use crate::client::protocol::ProtocolVersion;
-use crate::client::testing::{Answer, Log, args, connection, err, func, ret};
+use crate::client::testing::{Answer, Log, args, connection, func, ret};
 use crate::wire::{self, Reader};
 
 const OBJECT: ObjectHandle = ObjectHandle(45);
@@ -23,10 +20,6 @@ fn only_request(log: &Log) -> Value {
     let mut requests = log.requests();
     assert_eq!(requests.len(), 1, "{requests:?}");
     requests.remove(0)
-}
-
-fn v1(values: Vec<Value>) -> Answer {
-    Answer::Say(wire::map([("success", Value::from(true)), ("ret", Value::Array(values))]))
 }
 
 #[test]
@@ -104,13 +97,11 @@ fn the_second_number_of_an_interval_is_its_length() {
 }
 
 #[test]
-fn images_come_with_row_0_on_top_whether_bytes_or_text() {
-    // 1 × 2, the bottom row first; all of it printable, which an old server sends as text.
-    for buffer in [Value::Bytes(b"abcdef".to_vec()), Value::from("abcdef")] {
-        let (mut sim, _log) = answering(vec![buffer, wire::integers([1, 2])]);
-        let image = sim.get_vision_sensor_image(OBJECT).expect("an image");
-        assert_eq!(image.as_raw(), b"defabc");
-    }
+fn images_come_with_row_0_on_top() {
+    // 1 × 2, the bottom row first.
+    let (mut sim, _log) = answering(vec![Value::Bytes(b"abcdef".to_vec()), wire::integers([1, 2])]);
+    let image = sim.get_vision_sensor_image(OBJECT).expect("an image");
+    assert_eq!(image.as_raw(), b"defabc");
 }
 
 #[test]
@@ -249,53 +240,4 @@ fn limits_that_are_none_are_refused_before_anything_is_sent() {
         assert!(matches!(error, LinkError::BadMotion { .. }), "{error}");
     }
     assert!(log.events().is_empty());
-}
-
-#[test]
-fn an_old_server_has_no_motions_and_says_1_where_others_say_nothing() {
-    let (mut sim, log) = sim(|_| v1(vec![Value::from(1)]));
-    assert_eq!(sim.set_joint_position(OBJECT, 0.5), Ok(true));
-    assert_eq!(sim.connection().version(), Some(ProtocolVersion::V1));
-    let error = sim.move_to_pose(&motion(), &CallOptions::default()).expect_err("not there");
-    assert!(matches!(error, LinkError::Unsupported { .. }), "{error}");
-    assert_eq!(log.requests().len(), 1, "asking would only give an error in Lua");
-}
-
-#[test]
-fn a_server_without_motions_is_too_old() {
-    let (mut sim, _log) = sim(|_| err("No such function: sim.moveToPose_init"));
-    assert!(matches!(sim.move_to_pose_init(&motion()), Err(LinkError::Unsupported { .. })));
-}
-
-#[test]
-fn an_old_server_is_stepped_by_its_clock() {
-    let mut passes = 0;
-    let (mut sim, log) = sim(move |request| match func(request) {
-        "sim.getSimulationTime" => {
-            passes += 1;
-            // The pass takes a few looks at the clock.
-            v1(vec![Value::Float(if passes < 5 { 0.0 } else { 0.05 })])
-        }
-        "sim.getSimulationState" => v1(vec![Value::from(17)]),
-        _ => v1(vec![]),
-    });
-    sim.get_simulation_time().expect("answered");
-    sim.set_stepping(true).expect("answered");
-    sim.step(&CallOptions::default()).expect("stepped");
-    let uuid = Value::from(sim.connection().uuid());
-    let requests = log.requests();
-    let call = |name: &str| requests.iter().find(|r| func(r) == name).map(|r| args(r).to_vec());
-    assert_eq!(call("setStepping"), Some(vec![Value::from(true), uuid.clone()]));
-    assert_eq!(call("step"), Some(vec![uuid]));
-}
-
-#[test]
-fn an_old_server_whose_clock_stands_is_not_waited_for_for_ever() {
-    let (mut sim, _log) = sim(|request| match func(request) {
-        "sim.getSimulationState" => v1(vec![Value::from(17)]),
-        _ => v1(vec![Value::from(0)]),
-    });
-    sim.get_simulation_time().expect("answered");
-    let options = CallOptions { total_timeout: Some(Duration::from_millis(50)), ..CallOptions::default() };
-    assert!(matches!(sim.step(&options), Err(LinkError::Timeout { .. })));
 }
