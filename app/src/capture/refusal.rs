@@ -43,7 +43,7 @@ pub fn of_machine(refusal: &Refusal) -> Why {
         }
         Refusal::Paused => {
             let why = text!(
-                "The simulation is paused: no simulated time has passed for {seconds} s. Start it and capture again",
+                "No simulated time has passed for {seconds} s: the simulation is paused, or another client holds it. Let it go on and capture again",
                 seconds = NO_IMAGES_S
             );
             (RefusalKind::Paused, why)

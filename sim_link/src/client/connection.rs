@@ -12,6 +12,7 @@ use super::protocol::{
     self, ClientIds, END, EXECUTED, REPEAT, REQUIRE, ReplyError, Sender, ServerMessage, UNKNOWN_FUNCTION, WAIT,
 };
 use super::returned::Returned;
+use super::standstill::Standstill;
 use super::transport::{Transport, TransportFault, ZmqTransport};
 use crate::wire::WireError;
 use handeye_core::progress::CancelToken;
@@ -57,6 +58,8 @@ struct Exchange<'a> {
     cancelled_at: Cell<Option<Instant>>,
     /// The server has asked this client for something, so it waits for an answer inside the call.
     asked: bool,
+    awaits_pass: bool,
+    standstill: Standstill,
 }
 
 impl Exchange<'_> {
@@ -154,15 +157,18 @@ impl Connection {
     /// # Errors
     /// As [`Connection::call`].
     pub fn call_with(&mut self, func: &str, args: Vec<Value>, options: &CallOptions) -> Result<Returned, LinkError> {
+        let started = Instant::now();
         let mut exchange = Exchange {
             func,
             reply_timeout: options.reply_timeout.unwrap_or(self.options.reply_timeout),
             total_timeout: options.total_timeout.unwrap_or(self.options.total_timeout),
-            started: Instant::now(),
+            started,
             cancel: options.cancel.as_ref(),
             grace: options.grace,
             cancelled_at: Cell::new(None),
             asked: false,
+            awaits_pass: options.awaits_pass,
+            standstill: Standstill::begin(started),
         };
         // Between two calls it went without a word: the server may have forgotten this client since.
         if self.transport.ended() {
@@ -224,13 +230,21 @@ impl Connection {
                 ServerMessage::OldProtocol => {
                     return Err(self.give_up(exchange, LinkError::TooOld { version: None }));
                 }
-                ServerMessage::Ask { func } if func == REPEAT => exchange.asked = true,
                 ServerMessage::Ask { func } => {
-                    if func != WAIT {
+                    exchange.asked = true;
+                    let (repeats, waits) = (func == REPEAT, func == WAIT);
+                    // A call that is to be repeated has not begun, one that waits may be at work unless it is for a pass.
+                    if (repeats || (waits && exchange.awaits_pass))
+                        && let Some(after) = exchange.standstill.heard(Instant::now())
+                    {
+                        return Err(self.give_up(exchange, LinkError::Held { after }));
+                    }
+                    if !repeats && !waits {
                         tracing::debug!(callback = func, "the server asked for a callback, and there is none here");
                     }
-                    exchange.asked = true;
-                    message = self.request(EXECUTED, Vec::new());
+                    if !repeats {
+                        message = self.request(EXECUTED, Vec::new());
+                    }
                 }
                 ServerMessage::Nothing => {
                     return Err(self.unexpected(exchange, "a result", "an empty map".to_owned()));

@@ -42,12 +42,21 @@ pub enum LinkError {
     },
     /// The server accepted the connection but did not answer in time.
     #[error(
-        "{call}: no answer for {after:.1?}; the simulator may be busy, show a dialog or be held by a client in stepping \
-         mode: look at its window, then try again"
+        "{call}: no answer for {after:.1?}; the simulator may be busy or show a dialog: look at its window, then try \
+         again"
     )]
     Timeout {
         /// Which call.
         call: String,
+        /// How long was waited.
+        after: Duration,
+    },
+    /// The server answers, but no pass of the simulation begins although it runs.
+    #[error(
+        "the simulation has stood still for {after:.1?}: another client holds it, in stepping mode without a step or by a \
+         lock; let that client go on or end it, then try again"
+    )]
+    Held {
         /// How long was waited.
         after: Duration,
     },

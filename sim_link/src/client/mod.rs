@@ -17,6 +17,7 @@ mod options;
 mod protocol;
 mod returned;
 mod sim;
+mod standstill;
 #[cfg(test)]
 mod testing;
 mod transport;

@@ -59,6 +59,9 @@ pub struct CallOptions {
     pub cancel: Option<CancelToken>,
     /// How long a cancelled call may still end by itself: giving it up costs this client its record on the server.
     pub grace: Duration,
+    /// The call waits for one pass of the simulation, and is given up where another client keeps that from beginning:
+    /// [`LinkError::Held`](super::LinkError::Held).
+    pub awaits_pass: bool,
 }
 
 impl CallOptions {
@@ -66,7 +69,7 @@ impl CallOptions {
     /// That it is alive is watched by the connection itself.
     pub fn long(total: Duration, cancel: &CancelToken) -> Self {
         let total = Some(total);
-        Self { reply_timeout: total, total_timeout: total, cancel: Some(cancel.clone()), grace: Duration::ZERO }
+        Self { reply_timeout: total, total_timeout: total, cancel: Some(cancel.clone()), ..Self::default() }
     }
 
     /// The usual limits, and a cancel token.

@@ -16,5 +16,6 @@ mod vendor;
 
 mod slow {
     mod follow;
+    mod held;
     mod stops;
 }

@@ -181,6 +181,12 @@ impl PoseSequence<'_> {
                     thread::sleep(BEFORE_TRY);
                     self.take_up_again().and_then(|()| work(self))
                 }
+                // A client that was killed is forgotten by the server within seconds, and with it what it holds.
+                Err(error @ LinkError::Held { .. }) if !self.cancel.is_cancelled() && tries < TRIES => {
+                    tries += 1;
+                    tracing::warn!("on the way to {what}: {error}. Trying once more, {tries} of {TRIES}");
+                    self.take_up_again().and_then(|()| work(self))
+                }
                 outcome => return outcome.map_err(Failure::failed),
             };
         }

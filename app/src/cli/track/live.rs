@@ -286,7 +286,11 @@ impl Pause {
         }
         self.is_said = true;
         match sim.get_simulation_state()? {
-            SimulationState::Running => tracing::warn!("the simulated time does not advance: waiting for it"),
+            SimulationState::Running => {
+                tracing::warn!(
+                    "the simulated time does not advance, perhaps because another client holds it: waiting for it"
+                );
+            }
             SimulationState::Paused => tracing::warn!("the simulation is paused: waiting until it is continued"),
             SimulationState::Stopped => tracing::warn!("the simulation is stopped: waiting until it is started"),
         }

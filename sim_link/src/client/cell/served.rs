@@ -36,6 +36,8 @@ impl Arm {
             // inverse kinematics, with a wrong length.
             Err(error @ LinkError::Malformed { .. }) => {
                 tracing::info!(%error, "the motion is made in a single call");
+                // It says nothing until its end, so it is found out before whether another client holds the simulation.
+                self.sim.step(&CallOptions::cancelled_by(cancel))?;
                 let outcome = self.sim.move_to_pose(&motion, &CallOptions::long(LONGEST_MOTION, cancel));
                 match outcome {
                     Err(LinkError::Cancelled { .. } | LinkError::Timeout { .. } | LinkError::OwnCellSilent { .. }) => {
@@ -92,9 +94,10 @@ impl Arm {
         };
         match &outcome {
             Ok(()) => self.sim.move_to_pose_cleanup(state),
-            // A server that has gone or hangs drives nothing now, and asking it to tidy up only takes time.
+            // A server that has gone, hangs or is held drives nothing now, and asking it to tidy up only takes time.
             Err(
-                LinkError::Disconnected { .. }
+                LinkError::Held { .. }
+                | LinkError::Disconnected { .. }
                 | LinkError::Timeout { .. }
                 | LinkError::Unreachable { .. }
                 | LinkError::OwnCellSilent { .. }

@@ -85,10 +85,10 @@ impl Stream {
         Ok(Self { sentinel, dynamic, sent: start, seen_s: None, advanced, is_stopped: false, task })
     }
 
-    /// Tidies up behind the last point, unless the connection is gone.
+    /// Tidies up behind the last point, unless the connection is gone or this client a new one for the server.
     pub fn end<T>(self, arm: &mut Arm, outcome: Result<T, LinkError>) -> Result<T, LinkError> {
         match outcome {
-            Err(error) if error.is_connection_loss() => Err(error),
+            Err(error) if error.is_connection_loss() || matches!(error, LinkError::Held { .. }) => Err(error),
             outcome => self.sentinel.end(&mut arm.sim).and(outcome),
         }
     }

@@ -107,9 +107,11 @@ impl Sim {
     /// read afterwards belong together. Returns at once when the simulation is stopped or paused.
     ///
     /// # Errors
-    /// Any [`LinkError`] of a call.
+    /// [`LinkError::Held`] when another client has kept the pass from beginning for three seconds, in stepping mode or by
+    /// a lock; this client's own stepping and locks are then over. Otherwise as for any call.
     pub fn step(&mut self, options: &CallOptions) -> Result<(), LinkError> {
-        self.call_with("sim.step", Vec::new(), options).map(drop)
+        let options = CallOptions { awaits_pass: true, ..options.clone() };
+        self.call_with("sim.step", Vec::new(), &options).map(drop)
     }
 
     /// Holds the simulation where it is until [`Sim::release_lock`], so that several calls see the same instant.
