@@ -63,7 +63,7 @@ impl CellArgs {
 /// The option `--scene`.
 #[derive(Debug, Args)]
 pub struct SceneArg {
-    /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, tracking, panda, xarm6; the
+    /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, coppeliasim, tracking, panda, xarm6; the
     /// reference scene if not given.
     #[arg(long, value_name = "FILE|NAME", help_heading = heading::CELL)]
     scene: Option<SceneChoice>,

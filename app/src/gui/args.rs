@@ -11,7 +11,7 @@ pub struct GuiArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
     pub connect: Option<String>,
-    /// Scene of the built-in cell: reference, realistic, tracking, panda, xarm6, or a scene file; as in the settings if not given.
+    /// Scene of the built-in cell: reference, realistic, coppeliasim, tracking, panda, xarm6, or a scene file; as in the settings if not given.
     #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["connect", "driver", "camera_driver"], help_heading = heading::CELL)]
     pub scene: Option<SceneChoice>,
     /// Driver of the robot, or of robot and camera: a command, or tcp://HOST:PORT.

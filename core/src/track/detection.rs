@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector2};
 use super::corner::{self, Place};
 use super::glance;
 use super::pose::{self, Fit};
+use crate::detect::checkerboard::on_hard_edges;
 use crate::detect::{DetectOptions, VisionError, detect_with};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::planar_pose;
@@ -133,7 +134,7 @@ impl Eye<'_> {
         found.retain(|(_, corner)| corner.contrast >= MIN_CONTRAST_PART * usual);
         let blur_px = median_high(found.iter().map(|(_, corner)| corner.blur_px));
         let corners: Vec<Corner> = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
-        let board = self.fitted(&corners, &rough, blur_px)?;
+        let board = self.on_hard_edges(self.fitted(&corners, &rough, blur_px)?);
         if board.fit.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
             return None;
         }
@@ -175,6 +176,17 @@ impl Eye<'_> {
             return None;
         }
         Some(Board { fit: self.better_of_both(&seen, fit), blur_px, first_dark: None })
+    }
+
+    /// The same board by all sides of its squares, where the image has hard edges: the model of a blurred corner is ten
+    /// times worse there.
+    fn on_hard_edges(&self, board: Board) -> Board {
+        let refined = on_hard_edges(self.image, &board.fit.corners, &self.grid());
+        let fit = refined.and_then(|corners| pose::robust(&self.seen(&corners), &board.fit.pose, EXACT_PX));
+        match fit.filter(|fit| self.check(&fit.corners).is_some()) {
+            Some(fit) => Board { fit, ..board },
+            None => board,
+        }
     }
 
     fn seen<'b>(&'b self, corners: &'b [Corner]) -> ViewInput<'b> {

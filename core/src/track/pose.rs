@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix6, Point3, Vector2, Vector6};
 
+use crate::estimate::handeye::joint::CornerWeights;
 use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::{Minimum, refine};
 use crate::geometry::se3;
@@ -29,9 +30,9 @@ pub(super) struct Fit {
     pub pose: Isometry3<f64>,
     /// Those of the corners given that are the board's.
     pub corners: Vec<Corner>,
-    /// JᵀJ of these by the right perturbation `[t; r]` [px²/m² and px²/rad²].
+    /// JᵀJ of these, weighed by what their detector states, by the right perturbation `[t; r]` [px²/m² and px²/rad²].
     pub information: Matrix6<f64>,
-    /// Sum of their squared residuals \[px²\].
+    /// Sum of their squared residuals, weighed likewise \[px²\].
     pub cost: f64,
 }
 
@@ -81,8 +82,9 @@ pub(super) fn robust(seen: &ViewInput<'_>, start: &Isometry3<f64>, floor_px: f64
 
 /// Least squares over some of the corners.
 fn plain(seen: &ViewInput<'_>, start: &Isometry3<f64>, corners: Vec<Corner>) -> Option<Fit> {
+    let weights = CornerWeights::stated(&corners).map(|weights| weights.sqrt_weights(&corners)).unwrap_or_default();
     let Minimum { pose, squared_px, information } =
-        refine(&ViewInput { corners: &corners, ..*seen }, start, PLAIN_STEPS)?;
+        refine(&ViewInput { corners: &corners, sqrt_weights: &weights, ..*seen }, start, PLAIN_STEPS)?;
     Some(Fit { pose, corners, information, cost: squared_px })
 }
 

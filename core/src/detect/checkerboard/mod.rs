@@ -1,5 +1,7 @@
-//! Chessboards: found by their saddles ([`search`]), brought into one order.
+//! Chessboards: found by their saddles ([`search`]), refined again where edges are hard ([`hard_edges`]), brought into one
+//! order.
 
+mod hard_edges;
 pub(crate) mod saddle;
 pub(crate) mod search;
 pub(crate) mod subpixel;
@@ -11,6 +13,7 @@ use super::VisionError;
 use super::order::{Ordered, canonical};
 use crate::progress::CancelToken;
 use crate::targets::Grid;
+use crate::targets::observation::Corner;
 
 /// Least share of neighbouring squares that must differ in the direction the pattern asks for.
 const MIN_ALTERNATION: f64 = 0.9;
@@ -29,6 +32,7 @@ pub(super) fn find(image: &GrayImage, grid: &Grid, cancel: &CancelToken) -> Resu
         return Ok(None);
     };
     let found = with_all_stated(image, found)?;
+    let found = hard_edges::refine(image, &found).unwrap_or(found);
     let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
     Ok(ordered.is_regular().then_some(ordered))
 }
@@ -44,6 +48,19 @@ pub fn chessboard_in_sight(
     cancel: &CancelToken,
 ) -> Result<Option<(usize, usize)>, VisionError> {
     Ok(search::largest(image, grid, cancel)?.map(|(width, height)| (width.max(height), width.min(height))))
+}
+
+/// All corners of a chessboard, found by somebody to a pixel or so, as an image with hard edges has them, each with its
+/// covariance; `None` for softer images, and where corners are missing.
+pub(crate) fn on_hard_edges(image: &GrayImage, corners: &[Corner], grid: &Grid) -> Option<Vec<Corner>> {
+    let mut points = vec![None; grid.len()];
+    for corner in corners {
+        *points.get_mut(corner.index)? = Some(corner.px);
+    }
+    let found = Ordered::new(points.into_iter().collect::<Option<_>>()?, grid);
+    let refined = hard_edges::refine(image, &found)?;
+    let all = refined.points.iter().zip(&refined.covariances_px2).enumerate();
+    Some(all.map(|(index, (&px, &covariance_px2))| Corner { index, px, covariance_px2 }).collect())
 }
 
 /// Corners without a fit are refined by OpenCV and stated with [`UNSURE_PX`].

@@ -46,6 +46,11 @@ impl Pattern {
         }
     }
 
+    /// 1 where a point is dark.
+    pub fn at(&self, [s, r]: [f64; 2]) -> f64 {
+        self.cell(floor(s), floor(r))
+    }
+
     /// 1 where the square with this lower corner is dark.
     fn cell(&self, s: f64, r: f64) -> f64 {
         let inside = s >= -1.0 && s < self.columns && r >= -1.0 && r < self.rows;

@@ -39,8 +39,16 @@ pub(super) fn develop(colours: Vec<f32>, width: u32, height: u32, imaging: &Imag
     RgbImage::from_raw(width, height, bytes).unwrap_or_default()
 }
 
-/// Adds noise to all depths below the far plane and keeps them between the planes.
+/// Adds noise to all depths below the far plane and keeps them between the planes; the others become what is said where
+/// nothing is.
 pub(super) fn disturb(depths_m: &mut [f32], near_m: f64, far_m: f64, imaging: &Imaging, seed: u64) {
+    add_noise(depths_m, near_m, far_m, imaging, seed);
+    if let Some(nothing_m) = imaging.depth_of_nothing_m {
+        depths_m.iter_mut().filter(|depth| **depth >= far_m as f32).for_each(|depth| *depth = nothing_m as f32);
+    }
+}
+
+fn add_noise(depths_m: &mut [f32], near_m: f64, far_m: f64, imaging: &Imaging, seed: u64) {
     let constant = positive(imaging.depth_noise_m);
     let quadratic = positive(imaging.depth_noise_per_m2);
     if constant == 0.0 && quadratic == 0.0 {

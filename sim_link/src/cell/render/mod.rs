@@ -2,7 +2,8 @@
 //!
 //! The lens is exact for every model of [`handeye_core::geometry::camera`], and so is the anti-aliasing of the board: a pixel
 //! holds the integral of the printed pattern over its own area, so that a corner detector meets the truth and not
-//! the artefacts of a sampler. Every image is a function of its arguments alone, seed included.
+//! the artefacts of a sampler. [`Sampling::Centre`] has those artefacts: it is what CoppeliaSim's vision sensors do.
+//! Every image is a function of its arguments alone, seed included.
 //!
 //! Pixel (0, 0) is the centre of the top left pixel and row 0 is the top row. Colours are linear reflectances from
 //! 0 to 1; there is no gamma. Lengths are metres.
@@ -10,6 +11,7 @@
 mod board;
 mod ground;
 mod imaging;
+mod print;
 pub mod props;
 mod rays;
 mod renderer;
@@ -19,10 +21,13 @@ mod shapes;
 mod stage;
 mod texture;
 
+use std::sync::Arc;
+
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
+pub use print::PrintErrors;
 pub use renderer::Renderer;
 
 /// All that a camera can see, and from where.
@@ -62,6 +67,8 @@ pub struct BoardSurface {
     pub white: f32,
     /// Colour of the back of the sheet.
     pub back: [f32; 3],
+    /// How the corners of the print are off the grid; `None` for an exact print.
+    pub print: Option<Arc<PrintErrors>>,
 }
 
 impl BoardSurface {
@@ -73,7 +80,8 @@ impl BoardSurface {
         square_m: f64,
         paper_m: [f64; 2],
     ) -> Self {
-        Self { world_from_target, columns, rows, square_m, paper_m, dark: 0.06, white: 0.9, back: [0.72, 0.72, 0.7] }
+        let (dark, white, back) = (0.06, 0.9, [0.72, 0.72, 0.7]);
+        Self { world_from_target, columns, rows, square_m, paper_m, dark, white, back, print: None }
     }
 }
 
@@ -190,10 +198,24 @@ impl Default for Light {
     }
 }
 
+/// What of a scene a pixel of the colour image is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// The mean over its area, as a pixel of a camera.
+    #[default]
+    Area,
+    /// What its centre sees, as in a frame buffer with one sample a pixel: edges are hard steps. CoppeliaSim's vision
+    /// sensors have it on every graphics card.
+    Centre,
+}
+
 /// What the sensor adds to the ideal image. A value that is not above zero, or not a number, switches its effect off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imaging {
+    /// What a pixel of the colour image is made of.
+    pub sampling: Sampling,
     /// Standard deviation of a Gaussian blur in pixels, on top of the box of a pixel.
     pub blur_px: f64,
     /// Standard deviation of the noise in grey levels, per channel and independent.
@@ -204,12 +226,26 @@ pub struct Imaging {
     pub depth_noise_m: f64,
     /// Growth of that deviation with the squared distance, 1/m.
     pub depth_noise_per_m2: f64,
+    /// Depth that is added, in parts of what depth changes by from a pixel to the next along the row or the column,
+    /// whichever is more: the polygon offset of OpenGL, half a pixel's in CoppeliaSim.
+    pub depth_offset_px: f64,
+    /// What is said of the depth where nothing is hit; the far plane if absent.
+    pub depth_of_nothing_m: Option<f64>,
 }
 
 impl Default for Imaging {
     /// The ideal sensor.
     fn default() -> Self {
-        Self { blur_px: 0.0, noise_grey: 0.0, exposure: 1.0, depth_noise_m: 0.0, depth_noise_per_m2: 0.0 }
+        Self {
+            sampling: Sampling::Area,
+            blur_px: 0.0,
+            noise_grey: 0.0,
+            exposure: 1.0,
+            depth_noise_m: 0.0,
+            depth_noise_per_m2: 0.0,
+            depth_offset_px: 0.0,
+            depth_of_nothing_m: None,
+        }
     }
 }
 
@@ -218,8 +254,8 @@ impl Default for Imaging {
 pub struct RenderedFrame {
     /// The image, row 0 on top.
     pub rgb: RgbImage,
-    /// Distance along the optical axis of what the centre of each pixel sees, row by row from the top; the far plane
-    /// exactly where there is nothing between near and far plane.
+    /// Distance along the optical axis of what the centre of each pixel sees, row by row from the top; where there is
+    /// nothing between near and far plane exactly the far plane, or what [`Imaging`] has for it.
     pub depth_m: Vec<f32>,
 }
 

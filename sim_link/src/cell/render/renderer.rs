@@ -7,7 +7,7 @@ use handeye_core::image::RgbImage;
 
 use super::rays::{Ray, RayTable, Tile};
 use super::stage::{BACKGROUND, Hit, Stage, TileContent};
-use super::{Imaging, RenderScene, RenderedFrame, imaging};
+use super::{Imaging, RenderScene, RenderedFrame, Sampling, imaging};
 
 /// Rays through a pixel that an edge crosses. Their offsets are distinct in both directions, so that edges along rows
 /// or columns get as many grey levels as slanted ones.
@@ -47,36 +47,36 @@ impl Renderer {
 
     /// Image and depth. The same arguments give the same bytes; give each frame its own `seed`.
     pub fn render(&self, scene: &RenderScene, imaging: &Imaging, seed: u64) -> RenderedFrame {
-        let mut traced = self.trace(scene, true);
+        let mut traced = self.trace(scene, imaging, true);
         let depth_m = self.finish_depth(std::mem::take(&mut traced.depths_m), imaging, seed);
         RenderedFrame { rgb: self.finish_rgb(traced, imaging, seed), depth_m }
     }
 
     /// The image of [`Self::render`] alone, bit for bit.
     pub fn render_rgb(&self, scene: &RenderScene, imaging: &Imaging, seed: u64) -> RgbImage {
-        self.finish_rgb(self.trace(scene, true), imaging, seed)
+        self.finish_rgb(self.trace(scene, imaging, true), imaging, seed)
     }
 
-    /// As [`Self::render_rgb`], with the depths of an ideal sensor, which cost nothing more; see [`Self::sense_depth`].
+    /// As [`Self::render_rgb`], with the depths of a sensor without noise, which cost nothing more; see [`Self::sense_depth`].
     pub fn render_rgb_with_ideal_depth(
         &self,
         scene: &RenderScene,
         imaging: &Imaging,
         seed: u64,
     ) -> (RgbImage, Vec<f32>) {
-        let mut traced = self.trace(scene, true);
+        let mut traced = self.trace(scene, imaging, true);
         let depths_m = std::mem::take(&mut traced.depths_m);
         (self.finish_rgb(traced, imaging, seed), depths_m)
     }
 
-    /// What the sensor makes of ideal depths: the same, bit for bit, as [`Self::render_depth`] of their scene.
+    /// What the sensor makes of depths without noise: the same, bit for bit, as [`Self::render_depth`] of their scene.
     pub fn sense_depth(&self, ideal_m: Vec<f32>, imaging: &Imaging, seed: u64) -> Vec<f32> {
         self.finish_depth(ideal_m, imaging, seed)
     }
 
     /// The depth of [`Self::render`] alone, bit for bit, at a fraction of its cost.
     pub fn render_depth(&self, scene: &RenderScene, imaging: &Imaging, seed: u64) -> Vec<f32> {
-        self.finish_depth(self.trace(scene, false).depths_m, imaging, seed)
+        self.finish_depth(self.trace(scene, imaging, false).depths_m, imaging, seed)
     }
 
     fn finish_rgb(&self, traced: Traced, imaging: &Imaging, seed: u64) -> RgbImage {
@@ -88,8 +88,8 @@ impl Renderer {
         depths_m
     }
 
-    fn trace(&self, scene: &RenderScene, with_colour: bool) -> Traced {
-        let stage = Stage::new(scene, self.near_m, self.far_m);
+    fn trace(&self, scene: &RenderScene, imaging: &Imaging, with_colour: bool) -> Traced {
+        let stage = Stage::new(scene, imaging, self.near_m, self.far_m);
         let pixels = self.table.width * self.table.height;
         let coloured = if with_colour { pixels } else { 0 };
         let mut traced = Traced {
@@ -107,7 +107,7 @@ impl Renderer {
                 sight
             })
             .collect();
-        if with_colour {
+        if with_colour && imaging.sampling == Sampling::Area {
             for (tile, sight) in self.table.tiles.iter().zip(&sights) {
                 self.smooth_edges(&stage, tile, sight, &mut traced);
             }
@@ -124,7 +124,7 @@ impl Renderer {
                 let i = y * self.table.width + x;
                 let ray = self.table.ray(x, y);
                 let hit = stage.first_hit(sight, &ray);
-                traced.depths_m[i] = hit.depth as f32;
+                traced.depths_m[i] = stage.sensed_depth(&hit, &ray) as f32;
                 if with_colour {
                     traced.faces[i] = stage.face(&hit);
                     traced.colours[3 * i..3 * i + 3].copy_from_slice(&stage.colour(sight, &hit, &ray));

@@ -356,8 +356,15 @@ fn unusable_intrinsics_give_an_empty_image_and_no_panic() {
 
 #[test]
 fn the_same_arguments_give_the_same_bytes_and_the_parts_equal_the_whole() {
-    let imaging =
-        Imaging { blur_px: 0.8, noise_grey: 3.0, exposure: 1.1, depth_noise_m: 0.001, depth_noise_per_m2: 0.001 };
+    let imaging = Imaging {
+        blur_px: 0.8,
+        noise_grey: 3.0,
+        exposure: 1.1,
+        depth_noise_m: 0.001,
+        depth_noise_per_m2: 0.001,
+        depth_offset_px: 0.4,
+        ..Imaging::default()
+    };
     let solids = random_solids(&mut ChaCha8Rng::seed_from_u64(2))
         .into_iter()
         .map(|solid| solid.with_finish(Finish::Brushed))

@@ -1,5 +1,7 @@
 //! A scene as one camera sees it: surfaces in camera coordinates with their looks.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::board::{Footprint, Pattern};
@@ -8,7 +10,7 @@ use super::rays::Ray;
 use super::shade::{Coat, Lamp, Spot};
 use super::shadow::{self, Caster};
 use super::shapes::{Facet, Rays, Surface, Vec3, dot, faces, scale_add};
-use super::{BoardSurface, RenderScene};
+use super::{BoardSurface, Imaging, PrintErrors, RenderScene, Sampling};
 
 /// Face number of the background.
 pub(super) const BACKGROUND: u16 = 0;
@@ -46,6 +48,8 @@ struct Print {
     r: Vec3,
     inverse_depth: Vec3,
     pattern: Pattern,
+    errors: Option<Arc<PrintErrors>>,
+    sampling: Sampling,
     dark: f32,
     white: f32,
 }
@@ -83,15 +87,23 @@ pub(super) struct Stage {
     background: [f32; 3],
     near_m: f64,
     far_m: f64,
+    depth_offset_px: f64,
 }
 
 impl Stage {
-    pub fn new(scene: &RenderScene, near_m: f64, far_m: f64) -> Self {
+    pub fn new(scene: &RenderScene, imaging: &Imaging, near_m: f64, far_m: f64) -> Self {
         let camera_from_world = scene.world_from_camera.inverse();
         let lamp = Lamp::new(&scene.light, &camera_from_world);
-        let mut stage =
-            Self { pieces: Vec::new(), casters: Vec::new(), lamp, background: scene.background, near_m, far_m };
-        stage.add_board(&scene.board, &camera_from_world);
+        let mut stage = Self {
+            pieces: Vec::new(),
+            casters: Vec::new(),
+            lamp,
+            background: scene.background,
+            near_m,
+            far_m,
+            depth_offset_px: if imaging.depth_offset_px > 0.0 { imaging.depth_offset_px } else { 0.0 },
+        };
+        stage.add_board(&scene.board, &camera_from_world, imaging.sampling);
         for (owner, solid) in scene.solids.iter().enumerate() {
             let camera_from_shape = camera_from_world * solid.world_from_shape;
             let coat = Coat::new(solid, &camera_from_shape, far_m);
@@ -103,12 +115,12 @@ impl Stage {
         stage
     }
 
-    fn add_board(&mut self, board: &BoardSurface, camera_from_world: &Isometry3<f64>) {
+    fn add_board(&mut self, board: &BoardSurface, camera_from_world: &Isometry3<f64>, sampling: Sampling) {
         let camera_from_target = camera_from_world * board.world_from_target;
         let half = |count: usize| 0.5 * (count as f64 - 1.0) * board.square_m;
         let middle = Point3::new(half(board.columns), half(board.rows), 0.0);
         self.casters.push(Caster::of_board(board, &middle, &camera_from_target));
-        self.pieces.extend(sheet(board, &middle, &camera_from_target, &self.lamp));
+        self.pieces.extend(sheet(board, &middle, &camera_from_target, &self.lamp, sampling));
     }
 
     fn add_face(&mut self, surfaces: Vec<Surface>, owner: usize, coat: &Coat) {
@@ -220,8 +232,13 @@ impl Stage {
         let piece = &self.pieces[first.piece as usize];
         let (true, Surface::Facet(facet)) = (sight.is_covered, &piece.surface) else { return None };
         // Every ray hits the facet, so that its outline need not be looked at.
-        let depth_along = |ray: &Ray| 1.0 / dot(facet.inverse_depth(), &ray.direction());
+        let depth_along = |ray: &Ray| {
+            let depth = 1.0 / dot(facet.inverse_depth(), &ray.direction());
+            depth + self.offset_of_depth(facet.inverse_depth(), depth, ray)
+        };
         let ground = match &piece.paint {
+            // Its depths come without the offset.
+            Paint::Ground(..) if self.depth_offset_px > 0.0 => return None,
             Paint::Ground(_, ground) => ground,
             Paint::Flat(colour) => {
                 (0..count).for_each(|i| put(depth_along(&ray_at(i)), *colour));
@@ -239,6 +256,28 @@ impl Stage {
         let shadows: Option<&dyn Fn(&Vec3) -> f32> = if sight.casters.is_empty() { None } else { Some(&sunlit) };
         ground.paint(count, ray_at, self.background, shadows, put);
         Some(piece.face)
+    }
+
+    /// What a sensor without noise says of the depth of a hit.
+    pub fn sensed_depth(&self, hit: &Hit, ray: &Ray) -> f64 {
+        let Some(index) = hit.piece.filter(|_| self.depth_offset_px > 0.0) else { return hit.depth };
+        let surface = &self.pieces[index as usize].surface;
+        let point = ray.direction().map(|c| c * hit.depth);
+        let normal = surface.normal(&point);
+        let tangent_plane = normal.map(|c| c / dot(&normal, &point));
+        hit.depth + self.offset_of_depth(&tangent_plane, hit.depth, ray)
+    }
+
+    /// The polygon offset at a point of the plane `c · p = 1`; none at the rim of a round body, where depth falls off
+    /// beyond all bounds within a pixel.
+    fn offset_of_depth(&self, c: &Vec3, depth: f64, ray: &Ray) -> f64 {
+        if self.depth_offset_px == 0.0 {
+            return 0.0;
+        }
+        let [x_by_u, x_by_v, y_by_u, y_by_v] = ray.by_pixel.map(f64::from);
+        let per_pixel = |x: f64, y: f64| (depth * depth * (c[0] * x + c[1] * y)).abs();
+        let slope = per_pixel(x_by_u, y_by_u).max(per_pixel(x_by_v, y_by_v));
+        if slope < depth { self.depth_offset_px * slope } else { 0.0 }
     }
 
     /// Number of the face that was hit.
@@ -286,6 +325,7 @@ fn sheet(
     middle: &Point3<f64>,
     camera_from_target: &Isometry3<f64>,
     lamp: &Lamp,
+    sampling: Sampling,
 ) -> Option<Piece> {
     let turn = |v: Vector3<f64>| camera_from_target.rotation * v;
     let middle = (camera_from_target * middle).coords;
@@ -304,6 +344,8 @@ fn sheet(
             r: in_squares(Vector3::y()),
             inverse_depth: c,
             pattern: Pattern::new(board.columns, board.rows),
+            errors: board.print.clone(),
+            sampling,
             dark: board.dark,
             white: board.white,
         })
@@ -319,6 +361,19 @@ impl Print {
         let direction = ray.direction();
         let depth = 1.0 / dot(&self.inverse_depth, &direction);
         let (s, r) = (depth * dot(&self.s, &direction), depth * dot(&self.r, &direction));
+        let centre = self.errors.as_ref().map_or([s, r], |errors| errors.on_grid([s, r]));
+        let dark = match self.sampling {
+            Sampling::Centre => self.pattern.at(centre),
+            Sampling::Area => self.pattern.dark_fraction(&self.footprint(ray, depth, [s, r], centre)),
+        } as f32;
+        let point = direction.map(|c| c * depth);
+        let light = lamp.brightness(&surface.normal(&point), &lamp.towards(&point), 1.0);
+        [light * (self.white + dark * (self.dark - self.white)); 3]
+    }
+
+    /// What a pixel covers around a point of the print. That the print is off the grid moves it: its sides change by
+    /// less than a hundredth.
+    fn footprint(&self, ray: &Ray, depth: f64, [s, r]: [f64; 2], centre: [f64; 2]) -> Footprint {
         let [x_by_u, x_by_v, y_by_u, y_by_v] = ray.by_pixel.map(f64::from);
         let slopes = |form: &Vec3, value: f64| {
             let by_x = depth * (form[0] - value * self.inverse_depth[0]);
@@ -326,10 +381,6 @@ impl Print {
             [by_x * x_by_u + by_y * y_by_u, by_x * x_by_v + by_y * y_by_v]
         };
         let ([s_by_u, s_by_v], [r_by_u, r_by_v]) = (slopes(&self.s, s), slopes(&self.r, r));
-        let footprint = Footprint { centre: [s, r], by_u: [s_by_u, r_by_u], by_v: [s_by_v, r_by_v] };
-        let dark = self.pattern.dark_fraction(&footprint) as f32;
-        let point = direction.map(|c| c * depth);
-        let light = lamp.brightness(&surface.normal(&point), &lamp.towards(&point), 1.0);
-        [light * (self.white + dark * (self.dark - self.white)); 3]
+        Footprint { centre, by_u: [s_by_u, r_by_u], by_v: [s_by_v, r_by_v] }
     }
 }

@@ -8,7 +8,8 @@ use super::Scene;
 use super::error::Violation;
 use super::resolved::intrinsics;
 use super::spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, RobotSpec, SimulationSpec, SlipSpec, SolidSpec,
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, PrintSpec, RobotSpec, SimulationSpec, SlipSpec,
+    SolidSpec,
 };
 
 type Check = Result<(), Violation>;
@@ -101,6 +102,7 @@ fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
         tip,
         start_joints_deg,
         joint_mode: _,
+        rest_error_deg,
         min_joints_deg,
         max_joints_deg,
         repeatability_mm,
@@ -151,6 +153,7 @@ fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
             in_range(&format!("robot.joint_offset_deg[{i}]"), offset[i], -most, most)?;
         }
     }
+    in_range("robot.rest_error_deg", *rest_error_deg, 0.0, 1.0)?;
     in_range("robot.repeatability_mm", *repeatability_mm, 0.0, 10.0)?;
     in_range("robot.repeatability_deg", *repeatability_deg, 0.0, 5.0)?;
     Ok(chain.with_ranges(&ranges).expect("a range for each joint, with room; both were checked"))
@@ -230,7 +233,7 @@ fn check_lens(intrinsics: &Intrinsics) -> Check {
 }
 
 fn check_board(board: &BoardSpec) -> Check {
-    let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg, motion, slip } =
+    let BoardSpec { columns, rows, square_m, paper_m, plane, random_offset_mm, random_offset_deg, motion, slip, print } =
         board;
     for (field, value) in [("board.columns", *columns), ("board.rows", *rows)] {
         if !(2..=MAX_CORNERS).contains(&value) {
@@ -251,7 +254,20 @@ fn check_board(board: &BoardSpec) -> Check {
     in_range("board.random_offset_mm", *random_offset_mm, 0.0, 1000.0)?;
     in_range("board.random_offset_deg", *random_offset_deg, 0.0, 45.0)?;
     motion.check("board.motion.")?;
-    slip.as_ref().map_or(Ok(()), check_slip)
+    slip.as_ref().map_or(Ok(()), check_slip)?;
+    print.as_ref().map_or(Ok(()), |print| check_print(print, *square_m, paper_m))
+}
+
+/// A pixel of the picture or an error of a corner that is a good part of a square leaves no chessboard.
+fn check_print(print: &PrintSpec, square_m: f64, paper_m: &[f64; 2]) -> Check {
+    let PrintSpec { bitmap_px, white_mm, smooth_mm } = print;
+    for (axis, (pixels, paper)) in bitmap_px.iter().flatten().zip(paper_m).enumerate() {
+        let fewest = (4.0 * paper / square_m).ceil();
+        in_range(&format!("board.print.bitmap_px[{axis}]"), f64::from(*pixels), fewest, 100_000.0)?;
+    }
+    let most_mm = 20.0 * square_m;
+    in_range("board.print.white_mm", *white_mm, 0.0, most_mm)?;
+    in_range("board.print.smooth_mm", *smooth_mm, 0.0, most_mm)
 }
 
 fn check_slip(slip: &SlipSpec) -> Check {
@@ -263,16 +279,18 @@ fn check_slip(slip: &SlipSpec) -> Check {
 }
 
 fn check_image(image: &ImageSpec) -> Check {
-    let ImageSpec { noise_grey, blur_px, exposure } = image;
+    let ImageSpec { sampling: _, noise_grey, blur_px, exposure } = image;
     in_range("image.noise_grey", *noise_grey, 0.0, 64.0)?;
     in_range("image.blur_px", *blur_px, 0.0, 10.0)?;
     in_range("image.exposure", *exposure, 0.01, 100.0)
 }
 
 fn check_depth(depth: &DepthSpec) -> Check {
-    let DepthSpec { noise_mm, noise_mm_per_m2 } = depth;
+    let DepthSpec { noise_mm, noise_mm_per_m2, offset_px, nothing_m } = depth;
     in_range("depth.noise_mm", *noise_mm, 0.0, 1000.0)?;
-    in_range("depth.noise_mm_per_m2", *noise_mm_per_m2, 0.0, 1000.0)
+    in_range("depth.noise_mm_per_m2", *noise_mm_per_m2, 0.0, 1000.0)?;
+    in_range("depth.offset_px", *offset_px, 0.0, 10.0)?;
+    nothing_m.map_or(Ok(()), |metres| in_range("depth.nothing_m", metres, 0.0, 10_000.0))
 }
 
 fn check_light(light: &LightSpec) -> Check {

@@ -60,10 +60,16 @@ impl RobotErrors {
     }
 }
 
-/// Six independent Gaussian numbers `[t; r]` from one stream of a seed.
-pub(super) fn gaussian(seed: u64, stream: u64, sigma_m: f64, sigma_rad: f64) -> Vector6<f64> {
+/// One of the independent sources of random numbers that a seed has.
+pub(super) fn stream_of(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);
+    rng
+}
+
+/// Six independent Gaussian numbers `[t; r]` from one stream of a seed.
+pub(super) fn gaussian(seed: u64, stream: u64, sigma_m: f64, sigma_rad: f64) -> Vector6<f64> {
+    let mut rng = stream_of(seed, stream);
     Vector6::from_fn(|row, _| {
         let unit: f64 = StandardNormal.sample(&mut rng);
         unit * if row < 3 { sigma_m } else { sigma_rad }

@@ -10,6 +10,7 @@ mod check;
 mod error;
 mod errors_of_robot;
 mod locate;
+mod print;
 mod resolved;
 mod shipped;
 mod spec;
@@ -26,7 +27,7 @@ pub use errors_of_robot::RobotErrors;
 pub use resolved::{ResolvedScene, ResolvedSolid};
 pub use shipped::{SceneChoice, ShippedScene};
 pub use spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, PoseSpec, RelativeTo, RobotSpec,
+    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, PoseSpec, PrintSpec, RelativeTo, RobotSpec,
     SimulationSpec, SlipSpec, SolidSpec,
 };
 
@@ -105,6 +106,14 @@ impl Scene {
     /// None as long as the file that is built in is valid, which a test asserts.
     pub fn realistic() -> Result<Self, SceneError> {
         ShippedScene::Realistic.scene()
+    }
+
+    /// The reference cell with images, depth, print and arm as CoppeliaSim's own are.
+    ///
+    /// # Errors
+    /// None as long as the file that is built in is valid, which a test asserts.
+    pub fn coppeliasim() -> Result<Self, SceneError> {
+        ShippedScene::Coppeliasim.scene()
     }
 
     /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.

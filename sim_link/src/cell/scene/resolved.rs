@@ -1,16 +1,20 @@
 //! The truth of one run of the cell.
 
+use std::sync::Arc;
+
 use crate::axes::{sensor_from_camera, sheet_from_target};
+use crate::cell::render::{BoardSurface, Imaging, Light, LightSource, PrintErrors};
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 use handeye_core::targets::{Grid, TargetSpec};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::Scene;
 use super::arm::ArmSpec;
 use super::board_motion::BoardMotionSpec;
 use super::check::si;
-use super::errors_of_robot::{RobotErrors, gaussian};
+use super::errors_of_robot::{RobotErrors, gaussian, stream_of};
+use super::print::printed;
 use super::spec::{
     CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
     SlipSpec, SolidSpec,
@@ -20,6 +24,7 @@ use handeye_core::geometry::se3;
 
 const CAMERA_STREAM: u64 = 1;
 const BOARD_STREAM: u64 = 2;
+const PRINT_STREAM: u64 = 3;
 
 /// A scene with everything random drawn: what is true in one run.
 ///
@@ -60,12 +65,16 @@ pub struct ResolvedScene {
     pub board_slip: Option<SlipSpec>,
     /// What is printed on it.
     pub target: TargetSpec,
+    /// How the print is off that; `None` for an exact one.
+    pub print: Option<Arc<PrintErrors>>,
     /// Size of the sheet along x and y of the plane, metres.
     pub paper_m: [f64; 2],
     /// Joint values at the start, radians; of a prismatic joint metres.
     pub start_joints: JointValues,
     /// What moves them.
     pub joint_mode: JointModeSpec,
+    /// How far from its target a dynamic joint comes to rest at most, radians; of a prismatic joint metres.
+    pub rest_error: f64,
     /// Errors of the arm.
     pub robot_errors: RobotErrors,
     /// Imperfections of the colour image.
@@ -112,6 +121,56 @@ impl ResolvedScene {
         Ok(Pose::from_isometry(self.world_from_arm * arm_from_tip))
     }
 
+    /// What its sensors do to an image and to depth.
+    pub fn imaging(&self) -> Imaging {
+        let (image, depth) = (&self.image, &self.depth);
+        Imaging {
+            sampling: image.sampling,
+            blur_px: image.blur_px,
+            noise_grey: image.noise_grey,
+            exposure: image.exposure,
+            depth_noise_m: depth.noise_mm * 1e-3,
+            depth_noise_per_m2: depth.noise_mm_per_m2 * 1e-3,
+            depth_offset_px: depth.offset_px,
+            depth_of_nothing_m: depth.nothing_m,
+        }
+    }
+
+    /// Its light, for the renderer.
+    pub fn lamp(&self) -> Light {
+        let LightSpec { direction, ambient, diffuse, background: _ } = self.light;
+        let direction = Unit::try_new(Vector3::from(direction), 1e-12).unwrap_or_else(Vector3::z_axis);
+        let source = LightSource::Directional(direction);
+        Light { source, ambient: ambient as f32, diffuse: diffuse as f32 }
+    }
+
+    /// What is seen where nothing is.
+    pub fn background(&self) -> [f32; 3] {
+        self.light.background.map(|c| f32::from(c) / 255.0)
+    }
+
+    /// Its board, for the renderer, with its target frame at a pose in the world.
+    pub fn board_at(&self, world_from_target: Isometry3<f64>) -> BoardSurface {
+        let grid = self.target.grid();
+        BoardSurface {
+            print: self.print.clone(),
+            ..BoardSurface::new(world_from_target, grid.columns, grid.rows, grid.square_m, self.paper_m)
+        }
+    }
+
+    /// Where the corners were printed, in the target's frame and order.
+    pub fn printed_points(&self) -> Vec<Point3<f64>> {
+        let grid = self.target.grid();
+        let mut points = self.target.points();
+        for (index, point) in points.iter_mut().enumerate() {
+            let off = |print: &Arc<PrintErrors>| print.of_corner(index % grid.columns, index / grid.columns);
+            let [along_columns, along_rows] = self.print.as_ref().map_or([0.0; 2], off);
+            point.x += along_columns * grid.square_m;
+            point.y += along_rows * grid.square_m;
+        }
+        points
+    }
+
     /// The target as the camera sees it from a true tip pose.
     pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
         (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target
@@ -144,10 +203,12 @@ pub(super) fn resolve(scene: &Scene, arm: Arm, seed: u64) -> ResolvedScene {
         world_from_plane,
         board_motion: board.motion,
         board_slip: board.slip,
+        print: board.print.map(|print| Arc::new(printed(&print, board, &mut stream_of(seed, PRINT_STREAM)))),
         target,
         paper_m: board.paper_m,
         start_joints: JointValues::from_fn(arm.joint_count(), |i| si(arm.joints()[i].kind, robot.start_joints_deg[i])),
         joint_mode: robot.joint_mode,
+        rest_error: robot.rest_error_deg.to_radians(),
         robot_errors: RobotErrors::new(robot, arm.joint_count(), seed),
         arm,
         arm_model: robot.model.clone(),

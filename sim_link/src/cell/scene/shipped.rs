@@ -18,6 +18,8 @@ pub enum ShippedScene {
     Realistic,
     /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.
     Tracking,
+    /// The reference cell with images, depth, print and arm as CoppeliaSim's own are.
+    Coppeliasim,
     /// A Franka Panda, seven joints, over a board that lies flat.
     Panda,
     /// A UFACTORY xArm 6 over a board that lies flat.
@@ -26,13 +28,15 @@ pub enum ShippedScene {
 
 impl ShippedScene {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Reference, Self::Realistic, Self::Tracking, Self::Panda, Self::Xarm6];
+    pub const ALL: [Self; 6] =
+        [Self::Reference, Self::Realistic, Self::Coppeliasim, Self::Tracking, Self::Panda, Self::Xarm6];
 
     /// The name by which it is asked for: that of its file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reference => "reference",
             Self::Realistic => "realistic",
+            Self::Coppeliasim => "coppeliasim",
             Self::Tracking => "tracking",
             Self::Panda => "panda",
             Self::Xarm6 => "xarm6",
@@ -44,6 +48,7 @@ impl ShippedScene {
         match self {
             Self::Reference => (include_str!("../../../../assets/scenes/reference.toml"), None),
             Self::Realistic => (include_str!("../../../../assets/scenes/realistic.toml"), None),
+            Self::Coppeliasim => (include_str!("../../../../assets/scenes/coppeliasim.toml"), None),
             Self::Tracking => (include_str!("../../../../assets/scenes/tracking.toml"), None),
             Self::Panda => (
                 include_str!("../../../../assets/scenes/panda.toml"),
@@ -165,7 +170,11 @@ mod tests {
     #[test]
     fn a_name_that_no_scene_has_is_answered_with_those_that_there_are() {
         let said = |choice: &str| choice.parse::<SceneChoice>().unwrap().load().unwrap_err().to_string();
-        assert!(said("Panda").contains("reference, realistic, tracking, panda, xarm6"), "{}", said("Panda"));
+        assert!(
+            said("Panda").contains("reference, realistic, coppeliasim, tracking, panda, xarm6"),
+            "{}",
+            said("Panda")
+        );
         assert!(!said("no/such.toml").contains("panda"), "{}", said("no/such.toml"));
     }
 }

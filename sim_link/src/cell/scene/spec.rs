@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arm::ArmSpec;
 use super::board_motion::BoardMotionSpec;
+use crate::cell::render::Sampling;
 use handeye_core::geometry::arm::JointValues;
 
 /// cos 45° = sin 45°, for quaternions of quarter and half turns.
@@ -83,6 +84,8 @@ pub struct RobotSpec {
     pub start_joints_deg: JointValues,
     /// What moves them.
     pub joint_mode: JointModeSpec,
+    /// How far from its target a dynamic joint comes to rest, at most; another value at each target, as under load.
+    pub rest_error_deg: f64,
     /// Smallest joint values; those that the arm comes with if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_joints_deg: Option<JointValues>,
@@ -107,6 +110,7 @@ impl Default for RobotSpec {
             tip: PoseSpec { position_m: [0.0, 0.0, 0.017], ..PoseSpec::default() },
             start_joints_deg: JointValues::from([0.0, 45.0, -60.0, 0.0, 90.0, 0.0]),
             joint_mode: JointModeSpec::Kinematic,
+            rest_error_deg: 0.0,
             min_joints_deg: None,
             max_joints_deg: None,
             repeatability_mm: 0.0,
@@ -206,6 +210,23 @@ pub struct BoardSpec {
     /// That it slips once; it does not by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slip: Option<SlipSpec>,
+    /// How its corners are off the grid; they are not by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub print: Option<PrintSpec>,
+}
+
+/// A print that is not exact. Drawn once from the seed; the same in all views.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PrintSpec {
+    /// The sheet is a picture of so many pixels along x and y: each line of the grid stands between two of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bitmap_px: Option<[u32; 2]>,
+    /// Displacement of each corner by itself: 1σ per axis, millimetres.
+    pub white_mm: f64,
+    /// Displacement that changes smoothly over the print: 1σ per axis, millimetres. It has no part that a pose or a
+    /// size of the board could take up.
+    pub smooth_mm: f64,
 }
 
 /// A board that is knocked or sags: it moves once, while nobody looks.
@@ -231,6 +252,7 @@ impl Default for BoardSpec {
             random_offset_deg: 0.0,
             motion: BoardMotionSpec::default(),
             slip: None,
+            print: None,
         }
     }
 }
@@ -239,6 +261,9 @@ impl Default for BoardSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageSpec {
+    /// `"area"`: a pixel is the mean over its area. `"centre"`: it is what its centre sees, so that edges are hard steps,
+    /// as in CoppeliaSim.
+    pub sampling: Sampling,
     /// Noise per pixel and channel: 1σ in grey levels of 255.
     pub noise_grey: f64,
     /// Blur of lens and pixel: σ of a Gaussian in pixels.
@@ -249,7 +274,7 @@ pub struct ImageSpec {
 
 impl Default for ImageSpec {
     fn default() -> Self {
-        Self { noise_grey: 0.0, blur_px: 0.0, exposure: 1.0 }
+        Self { sampling: Sampling::Area, noise_grey: 0.0, blur_px: 0.0, exposure: 1.0 }
     }
 }
 
@@ -261,6 +286,13 @@ pub struct DepthSpec {
     pub noise_mm: f64,
     /// Part that grows with the square of the distance, millimetres per square metre, as of a triangulating sensor.
     pub noise_mm_per_m2: f64,
+    /// Depth that is added on slanted surfaces, in parts of what depth changes by from one pixel to the next: OpenGL's
+    /// polygon offset. CoppeliaSim has 0.475.
+    pub offset_px: f64,
+    /// What is reported where nothing is seen, metres; `far_m` of the camera if absent. CoppeliaSim reports 3.5000184 for
+    /// a far plane of 3.5 m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nothing_m: Option<f64>,
 }
 
 /// Light and background.

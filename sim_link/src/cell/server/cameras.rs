@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use handeye_core::geometry::camera::Intrinsics;
-use nalgebra::{Isometry3, Unit, Vector3};
+use nalgebra::Isometry3;
 
 use super::message;
 use super::stage::{Stage, out_of_sight};
 use crate::axes::sensor_from_camera;
-use crate::cell::render::{BoardSurface, Imaging, Light, LightSource, RenderScene, Renderer, Solid};
+use crate::cell::render::{BoardSurface, Imaging, Light, RenderScene, Renderer, Solid};
 use crate::cell::scene::ResolvedScene;
 use crate::cell::world::{Handle, Moment, Shown, VisionSensor};
 
@@ -56,7 +56,7 @@ impl Source {
     }
 }
 
-/// Depths without noise that came with a colour image. A depth sensor at the same place sees the same.
+/// Depths without noise, as the renderer has them, that came with a colour image. A depth sensor at the same place sees the same.
 #[derive(Debug)]
 struct IdealDepths {
     moment: Arc<Moment>,
@@ -94,24 +94,12 @@ pub struct Cameras {
 impl Cameras {
     /// The cameras of a scene.
     pub fn new(scene: &ResolvedScene) -> Self {
-        let grid = scene.target.grid();
-        let direction = Unit::try_new(Vector3::from(scene.light.direction), 1e-12).unwrap_or_else(Vector3::z_axis);
         Self {
             seed: scene.seed,
-            imaging: Imaging {
-                blur_px: scene.image.blur_px,
-                noise_grey: scene.image.noise_grey,
-                exposure: scene.image.exposure,
-                depth_noise_m: scene.depth.noise_mm * 1e-3,
-                depth_noise_per_m2: scene.depth.noise_mm_per_m2 * 1e-3,
-            },
-            light: Light {
-                source: LightSource::Directional(direction),
-                ambient: scene.light.ambient as f32,
-                diffuse: scene.light.diffuse as f32,
-            },
-            background: scene.light.background.map(|c| f32::from(c) / 255.0),
-            board: BoardSurface::new(out_of_sight(), grid.columns, grid.rows, grid.square_m, scene.paper_m),
+            imaging: scene.imaging(),
+            light: scene.lamp(),
+            background: scene.background(),
+            board: scene.board_at(out_of_sight()),
             renderers: Vec::new(),
             ranges_m: Vec::new(),
             images: BTreeMap::new(),
@@ -176,7 +164,10 @@ impl Cameras {
         let Some((shown, scene)) = seen else {
             return match channel {
                 Channel::Colour => self.background.map(|c| (c * 255.0).round() as u8).repeat(width * height),
-                Channel::Depth => (sensor.far_m as f32).to_le_bytes().repeat(width * height),
+                Channel::Depth => {
+                    let nothing_m = self.imaging.depth_of_nothing_m.unwrap_or(sensor.far_m);
+                    (nothing_m as f32).to_le_bytes().repeat(width * height)
+                }
             };
         };
         let seed = frame_seed(self.seed, handle, shown.pass);

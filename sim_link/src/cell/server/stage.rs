@@ -88,6 +88,7 @@ impl Builder {
         for (index, part) in chain.joints().iter().enumerate() {
             let mut joint = Joint::of(part.kind, &part.range);
             joint.set_position(resolved.start_joints[index])?;
+            joint.rest_error = resolved.rest_error;
             joint.mode = match resolved.joint_mode {
                 JointModeSpec::Kinematic => JointMode::Kinematic,
                 JointModeSpec::Dynamic => JointMode::Dynamic,

@@ -27,6 +27,8 @@ const STANDS_WITHIN_M: f64 = 0.02e-3;
 
 /// A dynamic joint lags behind a steady target by its velocity times this \[s\].
 const LAG_S: f64 = 0.07;
+/// How often in a radian the rest error of a dynamic joint changes: other poses, other errors.
+const LOAD_WAVES: f64 = 7.0;
 
 /// What moves a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,6 +59,8 @@ pub struct Joint {
     pub cyclic: bool,
     /// What moves it.
     pub mode: JointMode,
+    /// How far from its target it comes to rest at most where it is dynamic, as under a load that depends on where it is.
+    pub rest_error: f64,
     min_rad: f64,
     max_rad: f64,
     position_rad: f64,
@@ -97,6 +101,7 @@ impl Joint {
             kind: JointKind::Revolute,
             cyclic: false,
             mode: JointMode::Kinematic,
+            rest_error: 0.0,
             min_rad,
             max_rad,
             position_rad,
@@ -218,7 +223,8 @@ impl Joint {
     /// Moves on by one time step of the simulation.
     pub(super) fn advance(&mut self, dt_s: f64) {
         if self.mode == JointMode::Dynamic {
-            let way_rad = (self.target_rad - self.position_rad) * (1.0 - (-dt_s / LAG_S).exp());
+            let rests_at = self.target_rad + self.rest_error * (LOAD_WAVES * self.target_rad + 1.0).sin();
+            let way_rad = (rests_at - self.position_rad) * (1.0 - (-dt_s / LAG_S).exp());
             let most_rad = self.limits[0] * dt_s;
             let step_rad = way_rad.clamp(-most_rad, most_rad);
             self.velocity_rad_s = step_rad / dt_s;
