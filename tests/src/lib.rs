@@ -1,6 +1,7 @@
 //! Support for the end-to-end tests: where things are, and how to run them as a user does.
 
 pub mod browser;
+pub mod coppeliasim;
 pub mod desktop;
 pub mod hostile;
 pub mod network;

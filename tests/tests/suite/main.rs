@@ -12,6 +12,7 @@ mod reference_sets;
 mod renderer_truth;
 mod rerun_doors;
 mod restart;
+mod scene_script;
 mod served_doors;
 mod sessions;
 mod shared_intrinsics;
