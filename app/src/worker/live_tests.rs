@@ -404,7 +404,9 @@ mod slow {
             "at rest after (median, most) {of_window:.3?} s of the cell's time; asked for directly {of_client:.3?} s"
         );
         assert_eq!((took.len(), direct.len()), (STOPS, STOPS / 3));
-        assert!(of_window.1 <= AT_REST_S + of_client.1 - of_client.0, "{took:?}\ndirectly: {direct:?}");
+        // Times are sums of passes, which rounds them.
+        let bound_s = AT_REST_S + of_client.1 - of_client.0 + 1e-6;
+        assert!(of_window.1 <= bound_s, "{took:?}\ndirectly: {direct:?}");
     }
 
     #[test]

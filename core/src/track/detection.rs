@@ -82,6 +82,10 @@ impl Eye<'_> {
         Point3::new(column as f64 * square_m, row as f64 * square_m, 0.0)
     }
 
+    fn drawn(&self, index: usize) -> Point3<f64> {
+        self.board.drawn()[index]
+    }
+
     fn place(&self, board: &Isometry3<f64>, column: i64, row: i64, first_dark: bool) -> Option<Place> {
         let at = |c: i64, r: i64| self.camera.project(&(board * self.point(c, r))).ok();
         let place = Place {
@@ -162,7 +166,7 @@ impl Eye<'_> {
     }
 
     fn check(&self, corners: &[Corner]) -> Option<()> {
-        let points = corners.iter().map(|corner| self.board.drawn()[corner.index]);
+        let points = corners.iter().map(|corner| self.drawn(corner.index));
         let spread = MIN_SPREAD * self.grid().square_m;
         (corners.len() >= MIN_CORNERS && pose::spans(points, spread)).then_some(())
     }
@@ -181,7 +185,11 @@ impl Eye<'_> {
     /// The same board by all sides of its squares, where the image has hard edges: the model of a blurred corner is ten
     /// times worse there.
     fn on_hard_edges(&self, board: Board) -> Board {
-        let refined = on_hard_edges(self.image, &board.fit.corners, &self.grid());
+        // That of some corners the model does not fit says nothing there, so all are looked at where the pose has them.
+        let place =
+            |index: usize| Some(Corner::new(index, self.camera.project(&(board.fit.pose * self.drawn(index))).ok()?));
+        let places: Option<Vec<Corner>> = (0..self.grid().len()).map(place).collect();
+        let refined = places.and_then(|places| on_hard_edges(self.image, &places, &self.grid()));
         let fit = refined.and_then(|corners| pose::robust(&self.seen(&corners), &board.fit.pose, EXACT_PX));
         match fit.filter(|fit| self.check(&fit.corners).is_some()) {
             Some(fit) => Board { fit, ..board },

@@ -6,8 +6,8 @@ use rand_distr::{Distribution as _, StandardNormal};
 use super::{BoardSpec, PrintSpec};
 use crate::cell::render::PrintErrors;
 
-/// Degrees of the products of Legendre polynomials that the smooth part is made of, along x and y: the second and third
-/// order. Order zero would be a displacement of the board, and the first a turn, a size and a shear.
+/// Degrees of the products of polynomials that the smooth part is made of, along x and y: the second and third order. Order
+/// zero would be a displacement of the board, and the first a turn, a size and a shear.
 const SMOOTH: [[usize; 2]; 7] = [[2, 0], [1, 1], [0, 2], [3, 0], [2, 1], [1, 2], [0, 3]];
 
 /// Draws the print of a board.
@@ -19,13 +19,16 @@ pub(super) fn printed(print: &PrintSpec, board: &BoardSpec, rng: &mut impl Rng) 
     let white_squares = print.white_mm * 1e-3 / square_m;
     let nodes = (columns + 2) * (rows + 2);
     let white: Vec<[f64; 2]> = (0..nodes).map(|_| [normal() * white_squares, normal() * white_squares]).collect();
+    let along = [polynomials(columns), polynomials(rows)];
+    // On the outline as at the corner beside it.
+    let at = |axis: usize, degree: usize, index: i64| {
+        let values = &along[axis][degree];
+        values[index.clamp(0, values.len() as i64 - 1) as usize]
+    };
     PrintErrors::new(columns, rows, |column, row| {
-        let place = [unit_place(column, columns), unit_place(row, rows)];
         let mut off = white[(row + 1) as usize * (columns + 2) + (column + 1) as usize];
         for ([i, j], strength) in SMOOTH.iter().zip(&smooth) {
-            // A product of them has a mean square of 1 / (2i + 1) / (2j + 1).
-            let scale = ((2 * i + 1) as f64 * (2 * j + 1) as f64).sqrt();
-            let value = scale * legendre(*i, place[0]) * legendre(*j, place[1]);
+            let value = at(0, *i, column) * at(1, *j, row);
             off = [off[0] + strength[0] * value, off[1] + strength[1] * value];
         }
         let lines = [(column, columns), (row, rows)];
@@ -45,17 +48,21 @@ fn rounding(line: i64, count: usize, paper_squares: f64, pixels: u32) -> f64 {
     (from_edge / pixel).round() * pixel - from_edge
 }
 
-/// Where a corner is between the first, −1, and the last, 1; on the outline as at the corner beside it.
-fn unit_place(index: i64, count: usize) -> f64 {
-    let last = (count as f64 - 1.0).max(1.0);
-    (2.0 * index as f64 / last - 1.0).clamp(-1.0, 1.0)
-}
-
-fn legendre(degree: usize, x: f64) -> f64 {
-    match degree {
-        0 => 1.0,
-        1 => x,
-        2 => 0.5 * (3.0 * x * x - 1.0),
-        _ => 0.5 * (5.0 * x * x - 3.0) * x,
+/// Polynomials of degree 0 to 3 of the place of a corner along an axis, orthonormal over the corners: the mean square of each
+/// is 1. One of a degree that so few corners cannot have is zero.
+fn polynomials(count: usize) -> [Vec<f64>; 4] {
+    let mut all: [Vec<f64>; 4] = std::array::from_fn(|_| Vec::new());
+    for degree in 0..all.len() {
+        let mut values: Vec<f64> =
+            (0..count).map(|i| (2.0 * i as f64 / count as f64 - 1.0).powi(degree as i32)).collect();
+        for lower in &all[..degree] {
+            let part = values.iter().zip(lower).map(|(a, b)| a * b).sum::<f64>() / count as f64;
+            values.iter_mut().zip(lower).for_each(|(value, lower)| *value -= part * lower);
+        }
+        let rms = (values.iter().map(|value| value * value).sum::<f64>() / count as f64).sqrt();
+        let scale = if rms > 1e-9 { 1.0 / rms } else { 0.0 };
+        values.iter_mut().for_each(|value| *value *= scale);
+        all[degree] = values;
     }
+    all
 }

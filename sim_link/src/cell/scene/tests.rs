@@ -279,8 +279,7 @@ fn a_print_is_off_the_grid_by_what_the_scene_says_and_the_same_every_time() {
     let white = print_rms_mm("[board.print]\nwhite_mm = 0.03\n", 200);
     assert!(white.iter().all(|rms| (rms / 0.03 - 1.0).abs() < 4.0 / (2.0 * 14_000.0f64).sqrt()), "{white:?}");
     let smooth = print_rms_mm("[board.print]\nsmooth_mm = 0.03\n", 200);
-    // Corners are not a continuum: their mean squares of the terms are up to a half above those of the integrals.
-    assert!(smooth.iter().all(|rms| (0.8..1.4).contains(&(rms / 0.03))), "{smooth:?}");
+    assert!(smooth.iter().all(|rms| (rms / 0.03 - 1.0).abs() < 4.0 / (2.0 * 1400.0f64).sqrt()), "{smooth:?}");
     let scene = Scene::coppeliasim().unwrap();
     assert_eq!(scene.resolve(1).unwrap().printed_points(), scene.resolve(2).unwrap().printed_points());
 }
