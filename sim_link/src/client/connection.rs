@@ -31,6 +31,7 @@ const SLICE: Duration = Duration::from_millis(20);
 /// locks); unless the server was left in the middle of a conversation, waiting for this client and perhaps holding the
 /// simulation, or the call was cancelled or ran past its total time: then the record is ended and a new id taken.
 /// [`Connection::epoch`] tells when state on the server may have been lost.
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Connection {
     transport: Box<dyn Transport>,
     endpoint: Endpoint,

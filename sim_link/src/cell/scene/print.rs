@@ -57,11 +57,15 @@ fn polynomials(count: usize) -> [Vec<f64>; 4] {
             (0..count).map(|i| (2.0 * i as f64 / count as f64 - 1.0).powi(degree as i32)).collect();
         for lower in &all[..degree] {
             let part = values.iter().zip(lower).map(|(a, b)| a * b).sum::<f64>() / count as f64;
-            values.iter_mut().zip(lower).for_each(|(value, lower)| *value -= part * lower);
+            for (value, lower) in values.iter_mut().zip(lower) {
+                *value -= part * lower;
+            }
         }
         let rms = (values.iter().map(|value| value * value).sum::<f64>() / count as f64).sqrt();
         let scale = if rms > 1e-9 { 1.0 / rms } else { 0.0 };
-        values.iter_mut().for_each(|value| *value *= scale);
+        for value in &mut values {
+            *value *= scale;
+        }
         all[degree] = values;
     }
     all

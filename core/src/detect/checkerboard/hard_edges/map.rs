@@ -1,6 +1,6 @@
 //! A smooth map from the grid to the image.
 
-use nalgebra::{DMatrix, Matrix3, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
 use crate::detect::order::Ordered;
 use crate::geometry::planar_pose::homography::{homography, mapped};
@@ -9,44 +9,51 @@ use crate::geometry::planar_pose::homography::{homography, mapped};
 const DEGREE: usize = 3;
 
 /// Where points of the grid are in the image by what all corners say: a homography, and a polynomial for a lens and a board
-/// that is not flat.
+/// that is not flat where they show one.
 pub(super) struct SmoothMap {
     homography: Matrix3<f64>,
     columns: usize,
     rows: usize,
+    polynomial: Option<Polynomial>,
+}
+
+/// What is added to the homography.
+struct Polynomial {
     /// Exponents of the terms.
     terms: Vec<[usize; 2]>,
     /// Orthonormal over the corners: a row for each corner, a column for each term.
     basis: DMatrix<f64>,
     /// The basis from the powers: `basis = powers · to_basis`.
     to_basis: DMatrix<f64>,
-    /// What the polynomial adds, by basis function.
+    /// By basis function.
     added: Vec<Vector2<f64>>,
 }
 
 impl SmoothMap {
-    /// `None` where no homography fits.
-    pub fn of(found: &Ordered) -> Option<Self> {
+    /// `None` where no homography fits. What a polynomial would add counts from `least_squares` on, RMS per axis in squares.
+    pub fn of(found: &Ordered, least_squares: f64) -> Option<Self> {
         let (columns, rows) = (found.columns, found.rows());
-        let place = |index: usize| Vector2::new((index % columns) as f64, (index / columns) as f64);
-        let pairs: Vec<_> = found.points.iter().enumerate().map(|(index, px)| (place(index), *px)).collect();
+        let places: Vec<Vector2<f64>> = (0..found.points.len()).map(|index| place(index, columns)).collect();
+        let pairs: Vec<_> = places.iter().copied().zip(found.points.iter().copied()).collect();
         let homography = homography(&pairs)?;
         let terms: Vec<[usize; 2]> = (0..=DEGREE)
             .flat_map(|sum| (0..=sum).map(move |j| [sum - j, j]))
             .filter(|[i, j]| *i < columns && *j < rows)
             .collect();
-        let powers = DMatrix::from_fn(pairs.len(), terms.len(), |row, term| {
-            power(unit_place(pairs[row].0, columns, rows), terms[term])
+        let powers = DMatrix::from_fn(places.len(), terms.len(), |row, term| {
+            power(unit_place(places[row], columns, rows), terms[term])
         });
         let qr = powers.qr();
-        let to_basis = qr.r().try_inverse()?;
-        let mut map = Self { homography, columns, rows, terms, basis: qr.q(), to_basis, added: Vec::new() };
+        let (basis, to_basis) = (qr.q(), qr.r().try_inverse()?);
         let left: Vec<Vector2<f64>> = pairs.iter().map(|(place, px)| px - mapped(&homography, *place)).collect();
-        map.added = map
-            .basis
-            .column_iter()
-            .map(|column| column.iter().zip(&left).map(|(value, left)| left * *value).sum())
-            .collect();
+        let along =
+            |column: nalgebra::DVectorView<'_, f64>| column.iter().zip(&left).map(|(value, left)| left * *value).sum();
+        let added: Vec<Vector2<f64>> = basis.column_iter().map(along).collect();
+        let squares_px2: f64 = added.iter().map(Vector2::norm_squared).sum();
+        let mut map = Self { homography, columns, rows, polynomial: None };
+        if (squares_px2 / (2 * places.len()) as f64).sqrt() > least_squares * map.square_px() {
+            map.polynomial = Some(Polynomial { terms, basis, to_basis, added });
+        }
         Some(map)
     }
 
@@ -54,13 +61,10 @@ impl SmoothMap {
     /// it is a fit and no law.
     pub fn at(&self, column: f64, row: f64) -> Vector2<f64> {
         let place = Vector2::new(column, row);
+        let at = mapped(&self.homography, place);
+        let Some(polynomial) = &self.polynomial else { return at };
         let inside = Vector2::new(column.clamp(0.0, (self.columns - 1) as f64), row.clamp(0.0, (self.rows - 1) as f64));
-        let unit = unit_place(inside, self.columns, self.rows);
-        let powers = self.terms.iter().map(|term| power(unit, *term));
-        let powers = nalgebra::DVector::from_iterator(self.terms.len(), powers);
-        let basis = self.to_basis.tr_mul(&powers);
-        let added: Vector2<f64> = basis.iter().zip(&self.added).map(|(value, by)| by * *value).sum();
-        mapped(&self.homography, place) + added
+        at + polynomial.at(unit_place(inside, self.columns, self.rows))
     }
 
     /// The mean distance of neighbouring corners, pixels.
@@ -70,10 +74,42 @@ impl SmoothMap {
         0.25 * (((b - a).norm() + (c - d).norm()) / right + ((d - a).norm() + (c - b).norm()) / bottom)
     }
 
-    /// Displacements along one axis that the map could have taken up, orthonormal: a row for each corner.
-    pub fn smooth_displacements(&self) -> &DMatrix<f64> {
-        &self.basis
+    /// Displacements of all corners that another map of the kind would make, orthonormal: two rows for each corner, its x and
+    /// its y.
+    pub fn smooth_displacements(&self) -> DMatrix<f64> {
+        let corners = self.columns * self.rows;
+        if let Some(Polynomial { basis, .. }) = &self.polynomial {
+            let of_axis =
+                |row: usize, column: usize| if row % 2 == column % 2 { basis[(row / 2, column / 2)] } else { 0.0 };
+            return DMatrix::from_fn(2 * corners, 2 * basis.ncols(), of_axis);
+        }
+        // The derivatives by the numbers of the homography but one.
+        let by_number = DMatrix::from_fn(2 * corners, 8, |row, number| {
+            let at = place(row / 2, self.columns);
+            let px = mapped(&self.homography, at);
+            let unit = unit_place(at, self.columns, self.rows);
+            let depth = (self.homography * Vector3::new(at.x, at.y, 1.0)).z;
+            let weight = [unit.x, unit.y, 1.0][number % 3] / depth;
+            match number / 3 {
+                2 => -weight * px[row % 2],
+                axis if axis == row % 2 => weight,
+                _ => 0.0,
+            }
+        });
+        by_number.qr().q()
     }
+}
+
+impl Polynomial {
+    fn at(&self, unit: Vector2<f64>) -> Vector2<f64> {
+        let powers = DVector::from_iterator(self.terms.len(), self.terms.iter().map(|term| power(unit, *term)));
+        self.to_basis.tr_mul(&powers).iter().zip(&self.added).map(|(value, by)| by * *value).sum()
+    }
+}
+
+/// Column and row of a corner.
+fn place(index: usize, columns: usize) -> Vector2<f64> {
+    Vector2::new((index % columns) as f64, (index / columns) as f64)
 }
 
 /// Columns and rows from −1 to 1.

@@ -40,10 +40,22 @@ pub(super) struct Side {
     pub ends: [End; 2],
 }
 
+/// What the rows leave of the displacements of the ends of a side.
+#[derive(Debug, Clone)]
+pub(super) struct Edge {
+    /// The direction in which both ends move, in the image.
+    pub normal: Vector2<f64>,
+    /// The axis along which the edge was looked for: 0 along rows, 1 along columns.
+    pub cross: usize,
+    /// Where they can be, pixels.
+    pub polygon: Polygon,
+    /// Mean and covariance of that, everything in it being as probable.
+    pub moments: Moments,
+}
+
 /// What was seen of a side.
 pub(super) struct Seen {
-    /// What the rows leave of the displacements of its ends.
-    pub edge: Option<Moments>,
+    pub edge: Option<Edge>,
     pub passages: Vec<Passage>,
     /// Of how many of them a pixel beside the edge is neither dark nor light.
     pub mixed: usize,
@@ -154,7 +166,7 @@ fn step(image: &GrayImage, main: usize, row: f64, expected: f64, reach: f64) -> 
 }
 
 /// Where both ends can be along the normal.
-fn left_by(passages: &[Passage], normal: Vector2<f64>, cross: usize, slack: f64) -> Option<Moments> {
+fn left_by(passages: &[Passage], normal: Vector2<f64>, cross: usize, slack: f64) -> Option<Edge> {
     let mut polygon = Polygon::unbounded();
     // A step of one pixel along the row is less across the edge.
     let scale = normal[cross];
@@ -164,5 +176,6 @@ fn left_by(passages: &[Passage], normal: Vector2<f64>, cross: usize, slack: f64)
         polygon.cut(along, most + slack);
         polygon.cut(-along, slack - least);
     }
-    polygon.moments(normal, cross)
+    let moments = polygon.moments()?;
+    Some(Edge { normal, cross, polygon, moments })
 }
