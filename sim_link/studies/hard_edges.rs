@@ -59,7 +59,10 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-fn taught() -> Result<Vec<(String, Pose<Base, Tip>)>, Failure> {
+/// A name and a pose of the tip.
+type Taught = (String, Pose<Base, Tip>);
+
+fn taught() -> Result<Vec<Taught>, Failure> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml");
     let poses = TaughtPoses::parse(&file, &std::fs::read_to_string(&file)?)?.poses;
     let tip = |pose: &handeye_core::project::taught_poses::TaughtPose| match &pose.goal {
@@ -146,7 +149,7 @@ impl Session {
     fn of(scene: &ResolvedScene, views: Vec<ObservedView>) -> Result<Option<Self>, Failure> {
         let observations = Observations {
             mode: Some(Mode::EyeInHand),
-            target: scene.target.clone(),
+            target: scene.target,
             image_size: (scene.intrinsics.width, scene.intrinsics.height),
             camera: CameraKnowledge::NOTHING,
             views,
