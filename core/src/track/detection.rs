@@ -182,15 +182,16 @@ impl Eye<'_> {
         Some(Board { fit: self.better_of_both(&seen, fit), blur_px, first_dark: None })
     }
 
-    /// The same board by all sides of its squares, where the image has hard edges: the model of a blurred corner is ten
-    /// times worse there.
+    /// The same corners by all sides of the squares, where the image has hard edges.
     fn on_hard_edges(&self, board: Board) -> Board {
-        // That of some corners the model does not fit says nothing there, so all are looked at where the pose has them.
+        // The sides of all squares are looked at, where the pose has them. Corners that were not seen stay so: they may be hidden,
+        // or beyond the board, and how many are seen decides what is believed.
         let place =
             |index: usize| Some(Corner::new(index, self.camera.project(&(board.fit.pose * self.drawn(index))).ok()?));
         let places: Option<Vec<Corner>> = (0..self.grid().len()).map(place).collect();
         let refined = places.and_then(|places| on_hard_edges(self.image, &places, &self.grid()));
-        let fit = refined.and_then(|corners| pose::robust(&self.seen(&corners), &board.fit.pose, EXACT_PX));
+        let seen = |all: Vec<Corner>| board.fit.corners.iter().map(|corner| all[corner.index]).collect::<Vec<_>>();
+        let fit = refined.map(seen).and_then(|corners| pose::robust(&self.seen(&corners), &board.fit.pose, EXACT_PX));
         match fit.filter(|fit| self.check(&fit.corners).is_some()) {
             Some(fit) => Board { fit, ..board },
             None => board,

@@ -320,6 +320,50 @@ fn a_sharp_image_of_exact_coverage_is_followed() {
     }
 }
 
+#[test]
+fn corners_that_are_hidden_stay_unseen_where_edges_are_hard() {
+    use crate::geometry::camera::Intrinsics;
+    use crate::testing::Scene;
+    let mut setup = moving_board::setup();
+    setup.calibrated.intrinsics = Intrinsics::pinhole(640, 480, 581.0);
+    let mut watch = Watch::with(setup);
+    let mut covered_by_sides = 0;
+    for i in 0..8 {
+        let now = board_at(Vector3::new(0.003 * f64::from(i), 0.001 * f64::from(i), 0.0), Vector3::new(0.1, 0.2, 0.3));
+        let in_camera = watch.camera_from_target(&now);
+        let camera = watch.tracker.setup().calibrated.intrinsics;
+        let mut scene = Scene::new(camera, GRID, in_camera);
+        (scene.blur_px, scene.noise) = (0.0, 0.0);
+        let mut image = scene.render(0);
+        let levels = image.pixels().map(|pixel| pixel.0[0]);
+        let (dark, light) = levels.fold((255, 0), |(dark, light): (u8, u8), level| (dark.min(level), light.max(level)));
+        let middle = dark / 2 + light / 2;
+        // A pixel of which most is dark is one whose centre is.
+        image.pixels_mut().for_each(|pixel| pixel.0[0] = if pixel.0[0] < middle { dark } else { light });
+        let is_covered = i >= 4;
+        let back = in_camera.inverse();
+        for (u, v, pixel) in image.enumerate_pixels_mut().filter(|_| is_covered) {
+            let ray = back * *camera.unproject(&Vector2::new(f64::from(u), f64::from(v))).expect("in the image");
+            let column = (back.translation.vector - ray * (back.translation.z / ray.z)).x / GRID.square_m;
+            if column > 7.5 {
+                pixel.0[0] = middle;
+            }
+        }
+        let update = watch.show(&image, None);
+        let seen = update.seen.as_ref().expect("in sight");
+        let by_sides = seen.corners.iter().all(|corner| corner.covariance_px2.is_some());
+        assert!(by_sides || is_covered, "image {i} is taken for a soft one");
+        covered_by_sides += usize::from(by_sides && is_covered);
+        let beyond = seen.corners.iter().filter(|corner| corner.index % GRID.columns > 7).count();
+        assert!(
+            seen.corners.len() > 40 && (beyond > 0) != is_covered,
+            "{} corners, {beyond} beyond",
+            seen.corners.len()
+        );
+    }
+    assert!(covered_by_sides > 0, "no covered image was measured by its sides");
+}
+
 mod slow {
     use super::*;
 
