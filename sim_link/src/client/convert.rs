@@ -13,7 +13,7 @@ use handeye_core::geometry::frames::Pose;
 use handeye_core::image::RgbImage;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 
-/// A rotation may be off by so much (norm of a quaternion, entries of RᵀR) before it is refused. Single precision is
+/// How far a rotation may be off (norm of a quaternion, entries of RᵀR) before it is refused. Single precision is
 /// off by 1e-6; a quaternion in another order or scale by far more.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 

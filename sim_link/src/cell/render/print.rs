@@ -1,11 +1,9 @@
 //! A print whose corners are off the grid.
 
-use std::fmt;
-
 /// How the nodes of a chessboard are off the grid they stand for: the inner corners, and around them those on the
 /// outline of the print. Between nodes the print is stretched bilinearly, so that the sides of squares are straight
 /// from corner to corner.
-#[derive(Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PrintErrors {
     columns: usize,
     rows: usize,
@@ -53,12 +51,6 @@ fn cell(value: f64, last: usize) -> (f64, usize) {
     let from_first = (value + 1.0).clamp(0.0, (last + 1) as f64);
     let index = (from_first as usize).min(last);
     (from_first - index as f64, index)
-}
-
-impl fmt::Debug for PrintErrors {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "PrintErrors({} × {} nodes)", self.columns + 2, self.rows + 2)
-    }
 }
 
 #[cfg(test)]

@@ -286,6 +286,21 @@ mod tests {
     }
 
     #[test]
+    fn a_dynamic_joint_rests_beside_its_target_by_no_more_than_it_is_said_to_and_says_so() {
+        let mut joint = Joint::new(-TAU, TAU);
+        joint.mode = JointMode::Dynamic;
+        joint.rest_error = 1e-4;
+        let mut rests_at = |target: f64| {
+            joint.drive_to(target, None).expect("finite");
+            (0..200).for_each(|_| joint.advance(0.05));
+            joint.position_rad() - target
+        };
+        let off = [0.3, 0.9, -1.4].map(&mut rests_at);
+        assert!(off.iter().all(|off| off.abs() <= 1.001e-4) && off.iter().any(|off| off.abs() > 2e-5), "{off:?}");
+        assert!((rests_at(0.3) - off[0]).abs() < 1e-9, "the same target, another place");
+    }
+
+    #[test]
     fn a_driven_joint_ignores_positions_and_arrives_within_its_limits() {
         let mut joint = Joint::new(-TAU, TAU);
         joint.drive_to(1.0, Some([0.5, 2.0, 10.0])).expect("valid limits");
