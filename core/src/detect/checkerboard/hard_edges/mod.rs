@@ -2,7 +2,7 @@
 //!
 //! A frame buffer with one sample a pixel, as CoppeliaSim's vision sensors have it, knows of an edge only between which two
 //! pixel centres of a row or a column it passes. That is a uniform error of one pixel, and no noise: it repeats as long as
-//! nothing moves. Least squares on grey levels ([`super::search`]) take it for noise and end 0.15–0.25 px off. But along its
+//! nothing moves. Least squares on grey levels ([`super::search`]) take it for noise and end 0.07–0.25 px off. But along its
 //! length an edge passes at many places within a pixel, and each row says *between these two*: of the places of both ends of a
 //! side of a square the rows leave a small polygon ([`polygon`]). Its centroid and its second moments are what is known of the
 //! side, and where an edge runs along a row they say that its place within the pixel is not known.
@@ -51,8 +51,7 @@ const FURTHEST_PX: f64 = 1.5;
 /// be looked at.
 const REACHES: [Reach; 2] = [Reach { part: 0.3, most_px: 2.0 }, Reach { part: 0.2, most_px: 1.0 }];
 
-/// Rounds in which each polygon is seen in the light of all others; the answer changes by less than a tenth of its standard
-/// deviation in the last of them.
+/// Rounds in which each polygon is seen in the light of all others. A round solves the equations of all corners once more.
 const ROUNDS: usize = 6;
 
 /// The corners of an image with hard edges, with their covariances; `None` where edges are softer, or the board is not seen
