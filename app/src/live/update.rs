@@ -1,7 +1,6 @@
 //! How the images are looked at, and points that are measured in them.
 
 use handeye_core::depth::{ColourMap, DepthSample};
-use handeye_core::targets::bent::BoardPoints;
 use nalgebra::Vector2;
 
 use crate::app::App;
@@ -68,7 +67,7 @@ impl App {
         // The board and the tip of the same image: the newest frame may be a later one. The board is as large and as
         // bent as the calibration found it.
         let seen = self.model.detection.as_ref().and_then(|it| {
-            let board = BoardPoints::new(&self.model.document().meta.target.points());
+            let board = calibrated.board(&self.model.document().meta.target);
             let seen = calibrated.seen(&board, it.corners.as_ref()?, &it.camera_from_target?)?;
             Some((seen, it.base_from_tip?))
         });

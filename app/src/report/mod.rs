@@ -214,6 +214,9 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
         let (mm, deg) = (field.typical_mm, field.typical_deg);
         out.push(format!("robot errors that depend on its place: {mm:.3} mm and {deg:.4}° per axis, typically{with}"));
     }
+    if let Some(print) = &estimate.print {
+        out.push(format!("print of the target off its drawing: {:.4} mm RMS per axis", print.rms_mm));
+    }
     if let Some(distortion) = &estimate.residual_distortion {
         out.push(format!("lens beyond its model: {:.4} px RMS over the corners", distortion.rms_px));
     }

@@ -1,6 +1,7 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
 use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
+use handeye_core::estimate::handeye::joint::PrintErrors;
 use handeye_core::estimate::{Calibration, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
 
 use crate::text;
@@ -32,6 +33,7 @@ pub fn estimated(calibration: &Calibration) -> Vec<EstimatedValue> {
         lines.extend(bend(shape));
         lines.extend(size(shape));
     }
+    lines.extend(joint.print.as_ref().map(print));
     lines.extend(view_noise(joint));
     lines.extend(widening(joint));
     lines.push(freedom(joint));
@@ -83,6 +85,19 @@ fn size(shape: &ShapeEstimate) -> Option<EstimatedValue> {
         meaning: text!("Its true size over the stated one, by the motion of the robot; ± is one standard deviation"),
         why: None,
     })
+}
+
+fn print(print: &PrintErrors) -> EstimatedValue {
+    let (rms, most) = (print.rms_m() * 1e3, print.largest_m() * 1e3);
+    EstimatedValue {
+        what: text!("Print of the board"),
+        value: text!("{rms} mm off, {most} mm at most", rms = format!("{rms:.3}"), most = format!("{most:.3}")),
+        meaning: text!(
+            "How far the points of the board are from where its drawing has them: RMS per axis, and the farthest. The answer \
+             allows for it"
+        ),
+        why: None,
+    }
 }
 
 fn view_noise(joint: &JointFit) -> Option<EstimatedValue> {

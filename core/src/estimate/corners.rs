@@ -104,6 +104,14 @@ pub struct Session<'a> {
     begin: Result<Consensus, HandEyeError>,
 }
 
+/// What a joint estimate was made from.
+pub struct Fitted {
+    /// With the errors of its print, where they are shown.
+    board: BoardPoints,
+    /// Those that are not outliers.
+    views: Vec<View>,
+}
+
 impl Session<'_> {
     /// The answer of a closed form.
     fn closed_form(mut self, name: &str) -> Result<Calibration, CalibrateError> {
@@ -128,20 +136,28 @@ impl Session<'_> {
 
     /// The joint estimate of the session by itself, with the error that may be stated.
     pub fn alone(&self, options: Options, work: &Work<'_>) -> Result<Refined, CalibrateError> {
-        let refined = self.refine(None, options, work)?;
-        let kept = refined.screened.kept_views();
-        let problem = self.problem(&refined, &kept, None);
-        let refined = refined.with_distortion(&problem, work)?;
-        let kept = refined.screened.kept_views();
-        let problem = self.problem(&refined, &kept, None);
+        let mut refined = self.refine(None, options, work)?;
+        let fitted = self.fitted(&refined);
+        let problem = self.problem(&refined, &fitted, None);
+        refined = refined.with_distortion(&problem, work)?;
+        let fitted = self.fitted(&refined);
+        let as_drawn = JointProblem { board: &self.board, ..self.problem(&refined, &fitted, None) };
+        refined = refined.with_settled_print(&as_drawn, work)?;
+        let fitted = self.fitted(&refined);
+        let problem = self.problem(&refined, &fitted, None);
         Ok(refined.stated(&problem, work)?)
     }
 
-    /// The problem of the `kept` views that a joint estimate solved.
-    pub fn problem<'p>(&'p self, refined: &Refined, kept: &'p [View], lens: Option<LensPrior<'p>>) -> JointProblem<'p> {
-        let all = JointProblem::new(self.mode, &self.board, kept);
+    /// What a joint estimate was made from.
+    pub fn fitted(&self, refined: &Refined) -> Fitted {
+        Fitted { board: refined.board(&self.board), views: refined.screened.kept_views() }
+    }
+
+    /// The problem that a joint estimate solved.
+    pub fn problem<'p>(&self, refined: &Refined, of: &'p Fitted, lens: Option<LensPrior<'p>>) -> JointProblem<'p> {
+        let all = JointProblem::new(self.mode, &of.board, &of.views);
         let problem = JointProblem { weights: refined.weights, lens_prior: lens, ..all };
-        refine::kept_problem(&problem, kept, &refined.screened.solution)
+        refine::kept_problem(&problem, &of.views, &refined.screened.solution)
     }
 
     /// The calibration with a joint estimate that was made with what is known of the lens.
@@ -151,14 +167,14 @@ impl Session<'_> {
         lens: Option<LensPrior<'_>>,
         work: &Work<'_>,
     ) -> Result<Calibration, CalibrateError> {
-        let kept = refined.screened.kept_views();
-        if kept.len() < self.pairs.len() {
+        let fitted = self.fitted(&refined);
+        if fitted.views.len() < self.pairs.len() {
             // For comparison on the same views.
             let kept: Vec<PosePair> = refined.screened.kept.iter().map(|i| self.pairs[*i]).collect();
             self.calibration.methods = closed_forms(&kept, work)?;
         }
         let mut calibration = std::mem::take(&mut self.calibration);
-        let problem = self.problem(&refined, &kept, lens);
+        let problem = self.problem(&refined, &fitted, lens);
         let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
         take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
         Ok(calibration)
@@ -317,6 +333,7 @@ fn take_joint(
         heldout_rms_px: judged.heldout.map(|held| held.rms_px),
         heldout_links_rms_px: judged.heldout.map(|held| held.links_rms_px),
         field: solution.field.clone(),
+        print: refined.print.clone(),
         residual_distortion: refined.distortion.clone(),
         expected_heldout_rms_px: judged.expected_heldout_rms_px,
         robot_effect_px: judged.robot_effect_px,

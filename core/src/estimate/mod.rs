@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 use crate::estimate::claim::{Alternative, Claim};
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
-use crate::estimate::handeye::joint::{Free, Noise, RobotField, ShownDistortion, SmallSample};
+use crate::estimate::handeye::joint::{Free, Noise, PrintErrors, RobotField, ShownDistortion, SmallSample};
 use crate::estimate::handeye::one_axis::PartialHandEye;
 use crate::estimate::handeye::screening::Distance;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
@@ -461,6 +461,8 @@ pub struct JointFit {
     pub heldout_links_rms_px: Option<f64>,
     /// Errors of the robot that depend on where it stands, where the data show them.
     pub field: Option<RobotField>,
+    /// What the points of the target are off their drawing, where the data show it; residuals are with it.
+    pub print: Option<PrintErrors>,
     /// What the lens does beyond its model, where the data show it; residuals are with it.
     pub residual_distortion: Option<ShownDistortion>,
     /// What [`heldout_rms_px`](Self::heldout_rms_px) should be if the model and its noise levels are true, pixels.

@@ -9,9 +9,10 @@ use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::{Consensus, consensus};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
+use crate::estimate::handeye::joint::print_errors::{self, with_shown_print};
 use crate::estimate::handeye::joint::residual_distortion::{corrected, with_its_error, with_shown_distortion};
 use crate::estimate::handeye::joint::{
-    self, CornerWeights, Free, JointProblem, JointSolution, JointStart, ShownDistortion, with_shown_field,
+    self, CornerWeights, Free, JointProblem, JointSolution, JointStart, PrintErrors, ShownDistortion, with_shown_field,
 };
 use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::{HandEyeError, PosePair, determined};
@@ -22,6 +23,7 @@ use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::statistics::better_by_chance;
 use crate::progress::Work;
 use crate::targets::TargetSpec;
+use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::View;
 
 /// A joint estimate and what was decided on the way.
@@ -31,6 +33,8 @@ pub struct Refined {
     pub weights: Option<CornerWeights>,
     /// What an attempt at joint offsets gave; `None` when there was none.
     pub joints: Option<JointOffsets>,
+    /// What the points of the target are off their drawing, where the data show it.
+    pub print: Option<PrintErrors>,
     /// What the lens does beyond its model, where the data show it; it is taken off the corners of the views.
     pub distortion: Option<ShownDistortion>,
 }
@@ -100,26 +104,27 @@ pub fn refine(
     } else {
         estimate_screened(&problem, &start, own, *work)?
     };
-    if !warp && let Some(bent) = bent(&problem, &screened, work)? {
-        // A bent target looks like wrong views to a flat model, so they are judged again.
-        let problem = JointProblem { free: Free { warp: true, ..free }, ..problem };
-        screened = if options.keep_outliers {
-            Screened { solution: bent, ..screened }
-        } else {
-            estimate_screened(&problem, &bent.as_start(), own, work.cancel)?
-        };
+    // What the model did not know of makes views look wrong, so they are judged again once it does.
+    let again = |problem: &JointProblem<'_>, solution: JointSolution, screened: Screened| {
+        if options.keep_outliers {
+            return Ok(Screened { solution, ..screened });
+        }
+        estimate_screened(problem, &solution.as_start(), own, work.cancel)
+    };
+    if !warp && let Some(bent) = bent(&problem, &screened.kept_views(), &screened.solution, work)? {
+        screened = again(&JointProblem { free: bent.free, ..problem }, bent, screened)?;
+    }
+    let (print, with_print) = printed(&problem, &screened, work)?.unzip();
+    let board = print.as_ref().map(|print| print.on(problem.board));
+    let problem = JointProblem { board: board.as_ref().unwrap_or(problem.board), ..problem };
+    if let Some(with_print) = with_print {
+        screened = again(&JointProblem { free: with_print.free, ..problem }, with_print, screened)?;
     }
     let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
     if let Some(with_field) = with_shown_field(&problem, &screened.kept_views(), &screened.solution, *work)? {
-        // An error that all views of a place share makes them look like outliers to a model without it.
-        let problem = JointProblem { free: with_field.free, ..problem };
-        screened = if options.keep_outliers {
-            Screened { solution: with_field, ..screened }
-        } else {
-            estimate_screened(&problem, &with_field.as_start(), own, work.cancel)?
-        };
+        screened = again(&JointProblem { free: with_field.free, ..problem }, with_field, screened)?;
     }
-    Ok(Refined { screened, weights, joints, distortion: None })
+    Ok(Refined { screened, weights, joints, print, distortion: None })
 }
 
 impl Refined {
@@ -144,10 +149,31 @@ impl Refined {
         Ok(self)
     }
 
+    /// The same with the errors of the print as the views in the fit show them now; `problem` is of those views and of the
+    /// target as drawn.
+    pub fn with_settled_print(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
+        if let Some(shown) = self.print.clone() {
+            let solution = self.screened.solution.clone();
+            if let Some((print, solution)) = print_errors::settled(problem, shown, solution, work.cancel)? {
+                (self.print, self.screened.solution) = (Some(print), solution);
+            }
+        }
+        Ok(self)
+    }
+
+    /// The target of the fit.
+    pub fn board(&self, drawn: &BoardPoints) -> BoardPoints {
+        self.print.as_ref().map_or_else(|| drawn.clone(), |print| print.on(drawn))
+    }
+
     /// The same with the error that may be stated: that of a session by itself, if its lens does more than its model.
     pub fn stated(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let solution = self.screened.solution.clone();
         self.screened.solution = joint::with_stated_error(problem, solution, work.cancel)?;
+        if let Some(shown) = &mut self.print {
+            let solution = self.screened.solution.clone();
+            self.screened.solution = print_errors::with_its_error(problem, solution, shown, work.cancel)?;
+        }
         if let Some(shown) = &self.distortion {
             let solution = self.screened.solution.clone();
             self.screened.solution = with_its_error(problem, solution, shown, work.cancel)?;
@@ -179,17 +205,17 @@ pub fn kept_problem<'a>(problem: &JointProblem<'a>, views: &'a [View], solution:
 /// The estimate with a bent target, when the data support one.
 fn bent(
     problem: &JointProblem<'_>,
-    screened: &Screened,
+    views: &[View],
+    flat: &JointSolution,
     work: &Work<'_>,
 ) -> Result<Option<JointSolution>, HandEyeError> {
-    let views = screened.kept_views();
-    let free = Free { warp: true, ..screened.solution.free };
-    let with_warp = JointProblem { free, views: &views, ..*problem };
-    let one_step = joint::warp_ratio(&with_warp, &screened.solution, work.cancel)?;
+    let free = Free { warp: true, ..flat.free };
+    let with_warp = JointProblem { free, views, ..*problem };
+    let one_step = joint::warp_ratio(&with_warp, flat, work.cancel)?;
     if !one_step.is_some_and(may_be_shown) {
         return Ok(None);
     }
-    let start = screened.solution.as_start();
+    let start = flat.as_start();
     // A target seen square on says nothing of its shape.
     let Some(solution) = determined(joint::fit(&with_warp, &start, work.cancel))? else { return Ok(None) };
     // What estimated noise levels and a curved cost do to the covariance makes it larger.
@@ -208,6 +234,30 @@ fn bent(
         noise_m: solution.noise.corner_px * metres_per_px,
     };
     Ok(deflection.is_shown().then_some(solution))
+}
+
+/// The print errors that the views of a screened estimate show, and the estimate with them. `problem` has the target as drawn.
+///
+/// Where the target is bent as well, that is decided anew: points that are off within the plane look like a bend.
+fn printed(
+    problem: &JointProblem<'_>,
+    screened: &Screened,
+    work: &Work<'_>,
+) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
+    let views = screened.kept_views();
+    let problem = kept_problem(problem, &views, &screened.solution);
+    let shown = with_shown_print(&problem, &screened.solution, work.cancel)?;
+    if shown.is_none() || !problem.free.warp {
+        return Ok(shown);
+    }
+    let flat = JointProblem { free: Free { warp: false, ..problem.free }, ..problem };
+    let start = screened.solution.as_start();
+    let start = JointStart { shape: BoardShape { warp_m: [0.0; 2], ..start.shape }, ..start };
+    let Some(solution) = determined(joint::fit(&flat, &start, work.cancel))? else { return Ok(shown) };
+    let Some((print, solution)) = with_shown_print(&flat, &solution, work.cancel)? else { return Ok(shown) };
+    let board = print.on(problem.board);
+    let is_bent = bent(&JointProblem { board: &board, ..flat }, &views, &solution, work)?.is_some();
+    Ok(if is_bent { shown } else { Some((print, solution)) })
 }
 
 /// Tries joint offsets and takes them when held-out views are predicted better by them, by more than chance.

@@ -5,7 +5,7 @@
 //! against the edges; a target that hangs by its edges has both of one sign. It is the model of mrcal ("calobject warp"),
 //! which two real boards and a rendered one were found to follow.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 
 /// The shape of a real target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +46,13 @@ impl BoardPoints {
         };
         let sag = sag_along(0).into_iter().zip(sag_along(1)).map(|(x, y)| [x, y]).collect();
         Self { drawn: points.to_vec(), sag }
+    }
+
+    /// The same target whose points are printed off their places in its plane by so much, metres.
+    #[must_use]
+    pub fn displaced(&self, errors_m: &[Vector2<f64>]) -> Self {
+        let moved = |(point, error): (&Point3<f64>, &Vector2<f64>)| point + error.push(0.0);
+        Self { drawn: self.drawn.iter().zip(errors_m).map(moved).collect(), sag: self.sag.clone() }
     }
 
     /// Number of points.

@@ -158,6 +158,7 @@ pub fn calibrated() -> Predictor {
         shape: BoardShape::default(),
         hand_eye: HandEye::EyeInHand { tip_from_camera: tip_from_camera(), base_from_target: Pose::identity() },
         intrinsics: lens(),
+        print_errors_m: Vec::new(),
         joint_offsets_rad: Vec::new(),
         field: None,
         hand_eye_covariance: None,

@@ -94,6 +94,19 @@ pub fn add_waves(views: &mut [View], amplitude_px: f64, length_px: f64) {
     }
 }
 
+/// Displaces the points of a session's target in its plane, metres, and its corners with them.
+pub fn add_print_errors(session: &mut Trial, errors_m: &[Vector2<f64>]) {
+    let (camera, points) = (&session.intrinsics, &session.points);
+    for (view, pose) in session.views.iter_mut().zip(&session.true_camera_from_target) {
+        for corner in &mut view.corners {
+            let point = points[corner.index];
+            let [drawn, printed] = [point, point + errors_m[corner.index].push(0.0)]
+                .map(|point| camera.project(&(pose.isometry() * point)).expect("in front of the camera"));
+            corner.px += printed - drawn;
+        }
+    }
+}
+
 /// A target that is small in the image.
 pub const SMALL_TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 4, rows: 3, square_m: 0.015 });
 

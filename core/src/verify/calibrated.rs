@@ -1,6 +1,6 @@
 //! What of a calibration is needed to predict what the camera sees.
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::{DMatrix, Matrix6, Vector2};
 
 use super::VerifyError;
 use crate::estimate::Calibration;
@@ -11,6 +11,7 @@ use crate::estimate::handeye::joint::{
 use crate::estimate::uncertainty::quality;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};
 
@@ -23,6 +24,8 @@ pub struct Predictor {
     pub intrinsics: Intrinsics,
     /// The shape of the target.
     pub shape: BoardShape,
+    /// What the points of the target are off their drawing, metres; empty where the calibration found nothing of the kind.
+    pub print_errors_m: Vec<Vector2<f64>>,
     /// Offsets of the joints that the calibration counts on, to be added to the reported angles, radians; empty where it
     /// counts on none.
     pub joint_offsets_rad: Vec<f64>,
@@ -67,12 +70,21 @@ impl Predictor {
             hand_eye,
             intrinsics,
             shape: joint.and_then(|joint| joint.shape).map_or_else(BoardShape::default, |estimate| estimate.shape),
+            print_errors_m: joint
+                .and_then(|joint| joint.print.as_ref())
+                .map_or_else(Vec::new, |it| it.errors_m.clone()),
             joint_offsets_rad: offsets.map_or_else(Vec::new, |offsets| offsets.offsets_rad.clone()),
             field: joint.and_then(|joint| joint.field.clone()),
             hand_eye_covariance: calibration.hand_eye_covariance().copied(),
             small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
             uncertainty,
         })
+    }
+
+    /// The points of the target as they are printed; those of another target are as they are drawn.
+    pub fn board(&self, target: &TargetSpec) -> BoardPoints {
+        let drawn = BoardPoints::new(&target.points());
+        if drawn.len() == self.print_errors_m.len() { drawn.displaced(&self.print_errors_m) } else { drawn }
     }
 
     /// Where the tip is when the robot reports what it does in this view: with the offsets of the joints and the robot's

@@ -53,6 +53,7 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
             shape: BoardShape { scale: SCALE, ..BoardShape::default() },
             hand_eye: HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target),
             intrinsics: t.intrinsics,
+            print_errors_m: Vec::new(),
             joint_offsets_rad: Vec::new(),
             field: None,
             hand_eye_covariance: None,

@@ -181,7 +181,7 @@ pub fn verify<'a>(
     if captures.is_empty() {
         return Err(VerifyError::NoCaptures);
     }
-    let board = BoardPoints::new(&target.points());
+    let board = calibrated.board(target);
     let mut consistency = calibrated.uncertainty.as_ref().and_then(|it| consistency::Sums::new(calibrated, it));
     let mut checks = Vec::with_capacity(captures.len());
     let mut tips = Vec::with_capacity(captures.len());

@@ -30,6 +30,7 @@ fn truth(t: &Trial) -> Predictor {
         shape: BoardShape::default(),
         hand_eye: HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target),
         intrinsics: t.intrinsics,
+        print_errors_m: Vec::new(),
         joint_offsets_rad: Vec::new(),
         field: None,
         hand_eye_covariance: None,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use handeye_core::estimate::handeye::joint::SmallSample;
 use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::project::result::{CalibrationResult, TARGET_OPTION};
+use handeye_core::project::result::{CalibrationResult, PrintEstimate, TARGET_OPTION};
 use handeye_core::project::session::{RESULT, Session};
 use handeye_core::targets::bent::BoardShape;
 use handeye_core::targets::{Grid, TargetSpec};
@@ -37,6 +37,7 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
         said.and_then(|value| serde_json::from_value(value).ok())
     };
     let board = result.estimate.as_ref().and_then(|estimate| estimate.board.as_ref());
+    let print = result.estimate.as_ref().and_then(|estimate| estimate.print.as_ref());
     let shape = board.map_or_else(BoardShape::default, |board| BoardShape {
         warp_m: board.warp_mm.map(|mm| mm * 1e-3),
         scale: board.scale,
@@ -45,6 +46,7 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
         hand_eye,
         intrinsics,
         shape,
+        print_errors_m: print.map_or_else(Vec::new, PrintEstimate::errors_m),
         joint_offsets_rad: joint_offsets_rad(&result),
         field: result.estimate.as_ref().and_then(|estimate| Some(estimate.robot_field.as_ref()?.field())),
         hand_eye_covariance: covariance,

@@ -4,7 +4,7 @@ use egui::{Color32, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use handeye_core::geometry::frames::{Camera, Pose, Target};
 use handeye_core::geometry::statistics::median_high;
 use handeye_core::targets::TargetSpec;
-use handeye_core::targets::bent::{BoardPoints, BoardShape};
+use handeye_core::targets::bent::BoardShape;
 use handeye_core::targets::observation::Corner;
 use nalgebra::{Point3, Vector2};
 
@@ -303,7 +303,7 @@ pub fn live_residuals(model: &Model, corners: &[Corner]) -> Vec<(Vector2<f64>, V
     };
     // The pose of a tracked board is that of a flat one of the stated size.
     let shape = if model.track.on { BoardShape::default() } else { calibrated.shape };
-    let board = BoardPoints::new(&model.document().meta.target.points());
+    let board = calibrated.board(&model.document().meta.target);
     let residual = |corner: &Corner| {
         let point = camera_from_target.isometry() * board.point(corner.index, &shape);
         let predicted_px = calibrated.intrinsics.project(&point).ok()?;

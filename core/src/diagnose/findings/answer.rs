@@ -45,6 +45,7 @@ pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Find
     found.extend(pixel_aspect(calibration));
     found.extend(lens_folds(calibration));
     found.extend(robot_field(calibration));
+    found.extend(print_errors(calibration));
     found.extend(residual_distortion(calibration));
     found.extend(robot_noise(calibration));
     found.extend(closed_forms(calibration));
@@ -218,6 +219,24 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
     let finding = Finding::new(FindingCode::RobotField, Severity::Advice, text);
     let finding = finding.with("field_sigma", mm, "mm").with("field_sigma_angle", deg, "°");
     Some(finding.with("heldout_rms", without, "px").with("heldout_rms_corrected", with, "px"))
+}
+
+fn print_errors(calibration: &Calibration) -> Option<Finding> {
+    let found = calibration.joint.as_ref()?.print.as_ref()?;
+    if found.rms_m() < resolution::PLACE_M {
+        return None;
+    }
+    let (mm, most) = (found.rms_m() * 1e3, found.largest_m() * 1e3);
+    let text = text!(
+        "The target is not printed quite as drawn: its points are off by {mm} mm RMS per axis, {most} mm at the most, by the same \
+         in all views. The answer and its expected error count on it, and the result has the places of the points. Views with \
+         the board turned and tilted otherwise tell them apart from the lens; a better print is better still.",
+        mm = shown(mm, 3),
+        most = shown(most, 3)
+    );
+    let finding = Finding::new(FindingCode::PrintErrors, Severity::Advice, text);
+    let finding = finding.with("print_rms", mm, "mm").with("print_largest", most, "mm");
+    Some(finding.with("log_likelihood_gain", 0.5 * found.gain, ""))
 }
 
 fn residual_distortion(calibration: &Calibration) -> Option<Finding> {

@@ -88,6 +88,8 @@ pub enum FindingCode {
     LensFolds,
     /// The robot's errors depend on where it stands.
     RobotField,
+    /// The points of the target are not where its drawing has them.
+    PrintErrors,
     /// The lens does more than its model.
     ResidualDistortion,
     /// The closed forms do not agree.

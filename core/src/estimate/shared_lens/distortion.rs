@@ -4,10 +4,11 @@ use nalgebra::DMatrix;
 
 use super::{Fit, NamedSession, SharedLensError, fitted};
 use crate::estimate::corners::Session;
+use crate::estimate::handeye::joint::effects::Equations;
 use crate::estimate::handeye::joint::residual_distortion::shared::{
     Share, lens_covariance, together, with_shared_error,
 };
-use crate::estimate::handeye::joint::residual_distortion::{DEGREES, Equations, corrected, settled};
+use crate::estimate::handeye::joint::residual_distortion::{DEGREES, corrected, settled};
 use crate::estimate::handeye::joint::shared_lens::{self, Fitted, LensEstimate};
 use crate::estimate::handeye::joint::{JointSolution, ShownDistortion};
 use crate::progress::Work;
@@ -68,8 +69,8 @@ impl Together {
         let mut shares = Vec::with_capacity(self.sessions.len());
         for (i, Fitted { fit: Fit { refined, factor }, .. }) in self.sessions.iter().enumerate() {
             let Some(others) = shared_lens::by_others(&self.sessions, i) else { return Ok(None) };
-            let (kept, others) = (refined.screened.kept_views(), others.times(*factor));
-            let problem = prepared[i].problem(refined, &kept, Some(others.as_prior()));
+            let (from, others) = (prepared[i].fitted(refined), others.times(*factor));
+            let problem = prepared[i].problem(refined, &from, Some(others.as_prior()));
             let share = Share::new(&problem, &refined.screened.solution, degree, *factor, work.cancel);
             let Some(share) = share.map_err(|error| names[i].fails(error))? else { return Ok(None) };
             shares.push(share);
@@ -108,7 +109,7 @@ pub fn again(
     work: &Work<'_>,
 ) -> Result<Fitted<Fit>, crate::estimate::CalibrateError> {
     let others = others.clone().times(last.factor);
-    let kept = last.refined.screened.kept_views();
-    let problem = prepared.problem(&last.refined, &kept, Some(others.as_prior()));
+    let from = prepared.fitted(&last.refined);
+    let problem = prepared.problem(&last.refined, &from, Some(others.as_prior()));
     fitted(prepared, last.refined.again(&problem, work)?, Some(others.as_prior()), Some(last.factor), work)
 }

@@ -26,6 +26,7 @@ use super::uncertainty::widening;
 use super::{CalibrateError, Calibration, CameraKnowledge, Observations, Options};
 use crate::estimate::claim::Alternative;
 use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::print_errors;
 use crate::estimate::handeye::joint::shared_lens::{self, Fitted, LensEstimate, LensInformation};
 use crate::estimate::handeye::joint::{JointSolution, LensPrior};
 use crate::geometry::se3;
@@ -206,8 +207,8 @@ pub fn calibrate_sharing_lens<'a>(
     for (i, prepared) in prepared.into_iter().enumerate() {
         let Fit { mut refined, factor } = shared[i].fit.clone();
         let others = shared_lens::by_others(shared, i).ok_or(SharedLensError::NoLens)?.times(factor);
-        let kept = refined.screened.kept_views();
-        let problem = prepared.problem(&refined, &kept, Some(others.as_prior()));
+        let from = prepared.fitted(&refined);
+        let problem = prepared.problem(&refined, &from, Some(others.as_prior()));
         refined = refined.stated(&problem, work).map_err(|error| sessions[i].fails(error))?;
         refined.screened.solution = together.with_error(i, refined.screened.solution);
         refined.distortion = together.shown().cloned();
@@ -253,8 +254,8 @@ fn fitted(
     factor: Option<f64>,
     work: &Work<'_>,
 ) -> Result<Fitted<Fit>, CalibrateError> {
-    let kept = refined.screened.kept_views();
-    let problem = session.problem(&refined, &kept, prior);
+    let from = session.fitted(&refined);
+    let problem = session.problem(&refined, &from, prior);
     let solution = &refined.screened.solution;
     let factor = if let Some(factor) = factor {
         factor
@@ -266,7 +267,13 @@ fn fitted(
     let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));
     let says = match stated {
         Some(stated) => stated,
-        None => LensInformation::of(&problem, solution, work.cancel)?,
+        None => {
+            let says = LensInformation::of(&problem, solution, work.cancel)?;
+            let print = refined.print.as_ref();
+            let unknown =
+                print.map(|print| print_errors::lens_unknown(&problem, solution, print, work.cancel)).transpose()?;
+            unknown.flatten().and_then(|unknown| says.clone().less(&unknown)).unwrap_or(says)
+        }
     };
     let says = says.widened(factor);
     Ok(Fitted { fit: Fit { refined, factor }, says })

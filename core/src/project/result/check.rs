@@ -1,8 +1,8 @@
 //! What the types of a result do not say: finite, unit length, the frames of the mode.
 
 use super::{
-    CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, ResidualDistortionEstimate,
-    TransformEstimate, VERSION,
+    CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, PrintEstimate,
+    ResidualDistortionEstimate, TransformEstimate, VERSION,
 };
 use crate::estimate::handeye::Mode;
 use crate::geometry::camera::residual_distortion::{MOST_DEGREES, functions};
@@ -148,6 +148,16 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
         all_finite(field.position_slopes.as_flattened(), "estimate.robot_field.position_slopes")?;
         let orientation = field.orientation_slopes_rad_per_m.as_flattened();
         all_finite(orientation, "estimate.robot_field.orientation_slopes_rad_per_m")?;
+    }
+    if let Some(print) = &estimate.print {
+        let PrintEstimate { rms_mm, x_mm, y_mm, sigma_mm } = print;
+        not_negative(Some(*rms_mm), "estimate.print.rms_mm")?;
+        for (mm, key) in
+            [(x_mm, "estimate.print.x_mm"), (y_mm, "estimate.print.y_mm"), (sigma_mm, "estimate.print.sigma_mm")]
+        {
+            all_finite(mm, key)?;
+            require(mm.len() == x_mm.len(), key, "must have a number for each point of the target")?;
+        }
     }
     if let Some(distortion) = &estimate.residual_distortion {
         let ResidualDistortionEstimate { degree, x_px, y_px, .. } = distortion;

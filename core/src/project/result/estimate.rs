@@ -1,6 +1,6 @@
 //! What a joint estimate says beyond the answer: how sure it is and why, the target as it found it, the robot's joints.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::diagnose::record::FindingRecord;
@@ -39,6 +39,9 @@ pub struct EstimateDetails {
     /// Errors of the robot that depend on where it stands, where the data show them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot_field: Option<RobotFieldEstimate>,
+    /// What the points of the target are off their drawing, where the data show it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub print: Option<PrintEstimate>,
     /// What the lens does beyond its model, where the data show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_distortion: Option<ResidualDistortionEstimate>,
@@ -78,6 +81,29 @@ pub struct BoardEstimate {
     pub scale: f64,
     /// Its standard deviation; `None` when the stated size is taken as exact.
     pub scale_sigma: Option<f64>,
+}
+
+/// Where the points of the target are: printed off their places in the drawing, within its plane.
+///
+/// Point `k` in the order of the target's points is at `(x, y) + (x_mm[k], y_mm[k])` where it is drawn at `(x, y)`, along the
+/// axes of the target. A shift or a turn of all points together is none of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PrintEstimate {
+    /// RMS of all errors per axis, millimetres.
+    pub rms_mm: f64,
+    /// Errors along x, millimetres.
+    pub x_mm: Vec<f64>,
+    /// Along y, millimetres.
+    pub y_mm: Vec<f64>,
+    /// Standard deviation of both of a point, millimetres.
+    pub sigma_mm: Vec<f64>,
+}
+
+impl PrintEstimate {
+    /// The errors of all points, metres.
+    pub fn errors_m(&self) -> Vec<Vector2<f64>> {
+        self.x_mm.iter().zip(&self.y_mm).map(|(x, y)| Vector2::new(*x, *y) * 1e-3).collect()
+    }
 }
 
 /// The joints as found.

@@ -22,8 +22,8 @@ use crate::plan::guided::record::GuidedRecord;
 
 pub use check::BadResult;
 pub use estimate::{
-    BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, ResidualDistortionEstimate, RobotFieldEstimate,
-    TargetSizeEstimate, WideningRecord,
+    BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, PrintEstimate, ResidualDistortionEstimate,
+    RobotFieldEstimate, TargetSizeEstimate, WideningRecord,
 };
 pub use file::{ResultError, ResultProblem};
 pub use of_calibration::{TARGET_OPTION, solve_options};

@@ -6,10 +6,10 @@ use nalgebra::Matrix3;
 
 use super::{
     BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, MethodRecord,
-    Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate, ViewRecord,
+    PrintEstimate, Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate, ViewRecord,
     ViewRecordStatus, WideningRecord,
 };
-use crate::estimate::handeye::joint::{RobotField, ShownDistortion};
+use crate::estimate::handeye::joint::{PrintErrors, RobotField, ShownDistortion};
 use crate::estimate::uncertainty::widening::Evidence;
 use crate::estimate::{
     Calibration, CameraFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
@@ -100,6 +100,7 @@ impl Calibration {
                 accepted: j.accepted,
             }),
             robot_field: joint.field.as_ref().map(|field| robot_field(field, joint)),
+            print: joint.print.as_ref().map(print),
             residual_distortion: joint.residual_distortion.as_ref().map(residual_distortion),
         }
     }
@@ -135,6 +136,16 @@ fn robot_field(field: &RobotField, joint: &JointFit) -> RobotFieldEstimate {
         typical_mm: joint.noise.field_m * 1e3,
         typical_deg: joint.noise.field_rad.to_degrees(),
         heldout_rms_px: joint.heldout_rms_px,
+    }
+}
+
+fn print(shown: &PrintErrors) -> PrintEstimate {
+    let millimetres = |axis: usize| shown.errors_m.iter().map(|error| error[axis] * 1e3).collect();
+    PrintEstimate {
+        rms_mm: shown.rms_m() * 1e3,
+        x_mm: millimetres(0),
+        y_mm: millimetres(1),
+        sigma_mm: shown.sigma_m.iter().map(|m| m * 1e3).collect(),
     }
 }
 

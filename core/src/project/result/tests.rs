@@ -76,6 +76,12 @@ pub(crate) fn golden() -> CalibrationResult {
             typical_deg: 0.03,
             heldout_rms_px: Some(0.6),
         }),
+        print: Some(PrintEstimate {
+            rms_mm: 0.05,
+            x_mm: vec![0.05, -0.05],
+            y_mm: vec![-0.05, 0.05],
+            sigma_mm: vec![0.01, 0.02],
+        }),
         residual_distortion: Some(ResidualDistortionEstimate {
             degree: 1,
             x_px: vec![0.01, -0.02, 0.03],

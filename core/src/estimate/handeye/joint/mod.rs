@@ -26,6 +26,7 @@
 
 pub(crate) mod chain;
 mod curvature;
+pub(crate) mod effects;
 mod expected_pixels;
 mod expected_view;
 pub(crate) mod field;
@@ -35,6 +36,7 @@ pub(crate) mod normal;
 pub(crate) mod optimise;
 pub mod outliers;
 pub mod prediction;
+pub(crate) mod print_errors;
 mod problem;
 pub(crate) mod residual_distortion;
 pub(crate) mod shared_lens;
@@ -49,6 +51,7 @@ mod weights;
 use std::sync::Arc;
 
 use nalgebra::Point3;
+pub use print_errors::PrintErrors;
 pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
 pub use residual_distortion::ShownDistortion;
 pub(crate) use shown_field::SIZE_SIGMA;

@@ -84,6 +84,17 @@ impl LensInformation {
         Some(Self { at: solution.intrinsics, gradient: DVector::zeros(count), information })
     }
 
+    /// The same from a session in which something else makes the lens less known: where it is known to `I⁻¹`, by
+    /// `I⁻¹ G I⁻¹`. `None` where the lens is not determined.
+    #[must_use]
+    pub fn less(self, unknown: &DMatrix<f64>) -> Option<Self> {
+        let covariance = covariance_of(&self.information)?;
+        let information = covariance_of(&(&covariance + &covariance * unknown * &covariance))?;
+        // The step to the optimum is the same.
+        let gradient = &information * (&covariance * &self.gradient);
+        Some(Self { gradient, information, ..self })
+    }
+
     /// The same from a session whose variances are all so many times as large.
     #[must_use]
     pub fn widened(mut self, factor: f64) -> Self {

@@ -1,31 +1,22 @@
 //! Whether the data show that the lens does more than its model, and what that does to the answer.
 //!
-//! The [field](ResidualDistortion) is linear in its coefficients `c`, which are random effects: independent, with one
-//! standard deviation `s`. All other unknowns are eliminated from the normal equations of an optimum, so that the cost as a
-//! function of `c` is `cᵀ S c − 2 hᵀ c`; with the eigenvalues `a_k` of `S` and `h` in its axes, twice the logarithm of the
-//! restricted likelihood gains
-//!
-//! `Σ s² h_k² / (1 + s² a_k) − ln (1 + s² a_k)`
-//!
-//! over a lens that is of its model. The degree of the polynomials and `s` are those that gain most. Corners with the field
-//! `(S + s⁻²)⁻¹ h` taken off are estimated again until it stands still; the covariance of the answer has that of the
-//! coefficients added.
+//! The [field](ResidualDistortion) is an effect as in [`super::effects`]. The degree of the polynomials and the standard
+//! deviation of its coefficients are those that gain most. Corners with the field `(S + s⁻²)⁻¹ h` taken off are estimated
+//! again until it stands still; the covariance of the answer has that of the coefficients added.
 //!
 //! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model"; Patterson & Thompson
 //! 1971 (restricted likelihood). `docs/maths/residual_distortion.md`.
 
-mod equations;
 pub mod shared;
 
 use nalgebra::DMatrix;
 
+use super::effects::{Effect, Equations};
 use super::{JointProblem, JointSolution, fit};
 use crate::estimate::handeye::{HandEyeError, determined};
 use crate::geometry::camera::{Intrinsics, ResidualDistortion};
 use crate::progress::CancelToken;
 use crate::targets::observation::{Corner, View};
-
-pub use equations::Equations;
 
 /// Degrees that are tried: what a lens model leaves has more bends than the model's own terms, and beyond the highest the
 /// corners of a usual board are too far apart to see one.
@@ -34,6 +25,8 @@ pub const DEGREES: [usize; 3] = [3, 5, 8];
 /// hundred. Its level is at the edge of what it can be, so half of all healthy sessions gain nothing and the rest follows
 /// chi-square with one degree of freedom (Self & Liang 1987); three degrees are tried.
 const GAIN: f64 = 7.36;
+/// Standard deviations of a coefficient that are tried, pixels.
+const LEVELS_PX: std::ops::Range<f64> = 1e-4..1.0;
 /// Rounds of field and fit at the most.
 const MAX_ROUNDS: usize = 8;
 /// Square of the way of the field in a round, in its standard deviations, below which it stands still.
@@ -77,7 +70,7 @@ pub fn with_shown_distortion(
     }
     let views = problem.views;
     let [.., most] = DEGREES;
-    let Some(all) = Equations::new(problem, without, most, cancel)? else { return Ok(None) };
+    let Some(all) = Equations::new(problem, without, Effect::Distortion(most), cancel)? else { return Ok(None) };
     let mut last = None;
     let shown = settled(&without.intrinsics, &all, views, |field, degree| {
         // That of the round before is not needed any more, and is large where views are many.
@@ -85,7 +78,7 @@ pub fn with_shown_distortion(
         let corrected = corrected(views, field);
         let problem = JointProblem { views: &corrected, ..*problem };
         let Some(solution) = determined(fit(&problem, &without.as_start(), cancel))? else { return Ok(None) };
-        let equations = Equations::new(&problem, &solution, degree, cancel)?;
+        let equations = Equations::new(&problem, &solution, Effect::Distortion(degree), cancel)?;
         last = Some(solution);
         Ok(equations)
     })?;
@@ -101,7 +94,11 @@ pub fn settled<'v, E>(
     views: impl IntoIterator<Item = &'v View>,
     mut fit: impl FnMut(&ResidualDistortion, usize) -> Result<Option<Equations>, E>,
 ) -> Result<Option<ShownDistortion>, E> {
-    let tried = DEGREES.iter().filter_map(|degree| all.up_to(*degree).most_likely().map(|level| (*degree, level)));
+    let of_degree = |degree: &usize| {
+        let equations = all.up_to(*degree);
+        equations.may_gain(GAIN).then(|| (*degree, equations.spectrum().most_likely(&LEVELS_PX)))
+    };
+    let tried = DEGREES.iter().filter_map(of_degree);
     let Some((degree, mut level)) = tried.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)) else { return Ok(None) };
     if level.gain < GAIN {
         return Ok(None);
@@ -116,11 +113,11 @@ pub fn settled<'v, E>(
             return Ok(None);
         }
         let spectrum = equations.beyond(&coefficients).times(used_up).spectrum();
-        level = spectrum.most_likely();
-        let way = spectrum.length(&(&level.coefficients - &coefficients), level.level_px);
+        level = spectrum.most_likely(&LEVELS_PX);
+        let way = spectrum.length(&(&level.coefficients - &coefficients), level.level);
         if way < if round < MAX_ROUNDS { STILL } else { AT_LAST } {
             let rms_px = rms(views, &field);
-            return Ok(Some(ShownDistortion { field, level_px: level.level_px, rms_px, gain, used_up }));
+            return Ok(Some(ShownDistortion { field, level_px: level.level, rms_px, gain, used_up }));
         }
     }
     Ok(None)
@@ -142,7 +139,7 @@ pub fn with_its_error(
     shown: &ShownDistortion,
     cancel: &CancelToken,
 ) -> Result<JointSolution, HandEyeError> {
-    let Some(equations) = Equations::new(problem, &solution, shown.field.degree(), cancel)? else {
+    let Some(equations) = Equations::new(problem, &solution, Effect::Distortion(shown.field.degree()), cancel)? else {
         return Ok(solution);
     };
     let follow = equations.follow.clone();

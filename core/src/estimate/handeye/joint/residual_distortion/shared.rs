@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::equations::Equations;
 use super::{ShownDistortion, enlarged, with_variances};
 use crate::estimate::handeye::HandEyeError;
+use crate::estimate::handeye::joint::effects::{Effect, Equations};
 use crate::estimate::handeye::joint::normal::covariance_of;
 use crate::estimate::handeye::joint::shared_lens::LensEstimate;
 use crate::estimate::handeye::joint::view_block::Layout;
@@ -41,7 +41,7 @@ impl Share {
         factor: f64,
         cancel: &CancelToken,
     ) -> Result<Option<Self>, HandEyeError> {
-        let Some(own) = Equations::new(problem, solution, degree, cancel)? else { return Ok(None) };
+        let Some(own) = Equations::new(problem, solution, Effect::Distortion(degree), cancel)? else { return Ok(None) };
         let covariance = solution.linearised(problem)?.reduce(&solution.noise)?.inverse();
         let (at, count) = (Layout::FORM_AT, solution.intrinsics.parameter_count());
         let by_lens = covariance.columns(at, count).into_owned();

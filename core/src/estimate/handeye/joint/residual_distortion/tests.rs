@@ -85,7 +85,8 @@ fn the_answer_follows_a_small_field_as_the_equations_say() {
     };
     let before = at(&session.views);
     let information = before.hand_eye_covariance().try_inverse().expect("regular");
-    let equations = Equations::new(&problem, &before, 3, &cancel).expect("solves").expect("enough residuals");
+    let equations =
+        Equations::new(&problem, &before, Effect::Distortion(3), &cancel).expect("solves").expect("enough residuals");
     let size = (camera().width, camera().height);
     for k in [1, 4, 9, 11, 15, 19] {
         let mut coefficients = nalgebra::DVector::zeros(20);

@@ -1,30 +1,64 @@
-//! The equations of the coefficients of a residual distortion, and its level.
+//! Effects that displace the corners of all views, linear in many small coefficients: their equations, and their level.
+//!
+//! What a lens does beyond its model is one ([`super::residual_distortion`]), and what a print is off its drawing another
+//! ([`super::print_errors`]). The coefficients `c` are random effects. All other unknowns are eliminated from the normal
+//! equations of an optimum, so that the cost as a function of `c` is `cᵀ S c − 2 hᵀ c`. Where they are independent with one
+//! standard deviation `s`, with the eigenvalues `a_k` of `S` and `h` in its axes, twice the logarithm of the restricted
+//! likelihood gains
+//!
+//! `Σ s² h_k² / (1 + s² a_k) − ln (1 + s² a_k)`
+//!
+//! over a model without them.
+//!
+//! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model"; Patterson & Thompson
+//! 1971 (restricted likelihood).
+
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix6xX};
 
-use super::GAIN;
+use super::normal::Reduced;
+use super::state::State;
+use super::view_block::{Layout, Own, PixelWeights, ViewBlock, whitened};
+use super::{JointProblem, JointSolution, Noise};
 use crate::estimate::handeye::HandEyeError;
-use crate::estimate::handeye::joint::normal::Reduced;
-use crate::estimate::handeye::joint::state::State;
-use crate::estimate::handeye::joint::view_block::{Layout, Own, PixelWeights, ViewBlock, whitened};
-use crate::estimate::handeye::joint::{JointProblem, JointSolution, Noise};
 use crate::geometry::camera::residual_distortion::{basis, functions};
-use crate::geometry::view_equations::{MAX_FORM, POSE, Pair, Rows};
+use crate::geometry::view_equations::{MAX_FORM, POSE, Pair, Rows, ViewInput};
 use crate::progress::CancelToken;
 
-/// Part of [`GAIN`] that the square of the score, which follows from one product, has to reach for the rest to be computed. Of
-/// 276 simulated sessions that gain enough none was missed, and nine in ten spectra of healthy ones were spared.
+/// Part of a gain that the square of the score, which follows from one product, has to reach for the rest to be computed. Of
+/// 276 simulated sessions that gain enough by a residual distortion none was missed, and nine in ten spectra of healthy ones
+/// were spared.
 const NEARLY: f64 = 0.4;
-/// Standard deviations of a coefficient that are tried, pixels: from the least to the largest by this factor.
-const LEVELS: (f64, f64, f64) = (1e-4, 1.0, 1.1);
+/// Factor from one standard deviation that is tried to the next.
+const FACTOR: f64 = 1.1;
 /// Information below this part of the largest counts as none: a direction known a hundred times worse than the best says
 /// nothing of a field of a pixel, and where lens and poses take one up, rounding leaves 2e-5 of the largest on recorded sets.
 const UNSEEN: f64 = 1e-4;
 
+/// What displaces the corners.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    /// Polynomials up to a degree over the image, first those of the displacement along x, pixels.
+    Distortion(usize),
+    /// The points of the target in its plane, first all along x, metres.
+    Print,
+}
+
+impl Effect {
+    /// Number of coefficients.
+    fn count(self, problem: &JointProblem<'_>) -> usize {
+        2 * match self {
+            Self::Distortion(degree) => functions(degree),
+            Self::Print => problem.board.len(),
+        }
+    }
+}
+
 /// The normal equations of the coefficients once all else is eliminated.
 #[derive(Clone)]
 pub struct Equations {
-    /// Of the coefficients, per squared pixel.
+    /// Of the coefficients.
     pub information: DMatrix<f64>,
     /// At coefficients of zero: the right side.
     pub pull: DVector<f64>,
@@ -34,9 +68,9 @@ pub struct Equations {
     pub residuals: f64,
 }
 
-/// A field at the level that it most likely has.
+/// An effect at the level that it most likely has.
 pub struct MostLikely {
-    pub level_px: f64,
+    pub level: f64,
     pub gain: f64,
     pub coefficients: DVector<f64>,
     /// Trace of what the coefficients take up.
@@ -44,11 +78,11 @@ pub struct MostLikely {
 }
 
 impl Equations {
-    /// Of all polynomials up to a degree, at an optimum; `None` where there are too few residuals for them to be shown.
+    /// Of the coefficients of an effect, at an optimum; `None` where there are too few residuals for it to be shown.
     pub fn new(
         problem: &JointProblem<'_>,
         solution: &JointSolution,
-        degree: usize,
+        effect: Effect,
         cancel: &CancelToken,
     ) -> Result<Option<Self>, HandEyeError> {
         let (state, noise) = (State::of(solution), &solution.noise);
@@ -59,14 +93,14 @@ impl Equations {
             return Ok(None);
         }
         let reduced = system.reduce(noise)?;
-        let (n, k) = (system.layout.count(), 2 * functions(degree));
+        let (n, k) = (system.layout.count(), effect.count(problem));
         let mut sums =
             Sums { information: DMatrix::zeros(k, k), gradient: DVector::zeros(k), cross: DMatrix::zeros(n, k) };
         for index in 0..problem.views.len() {
             if cancel.is_cancelled() {
                 return Err(HandEyeError::Cancelled);
             }
-            let Some(products) = Products::new(problem, &state, index, degree) else { return Ok(None) };
+            let Some(products) = Products::new(problem, &state, index, effect) else { return Ok(None) };
             let (block, own) = (&system.blocks[index], &reduced.own[index]);
             sums.add(&products, block, own, noise);
         }
@@ -86,6 +120,17 @@ impl Equations {
         Self { information, pull: -gradient, follow, residuals }
     }
 
+    /// Of the coefficients `x` with `c = B x`.
+    pub fn along(&self, by: &DMatrix<f64>) -> Self {
+        let information = by.tr_mul(&(&self.information * by));
+        Self {
+            information: 0.5 * (&information + information.transpose()),
+            pull: by.tr_mul(&self.pull),
+            follow: &self.follow * by,
+            residuals: self.residuals,
+        }
+    }
+
     /// Those of the polynomials up to a lower degree.
     pub fn up_to(&self, degree: usize) -> Self {
         let (all, some) = (self.pull.len() / 2, functions(degree));
@@ -98,7 +143,7 @@ impl Equations {
         }
     }
 
-    /// The same where a field with these coefficients was taken off before.
+    /// The same where an effect with these coefficients was taken off before.
     pub fn beyond(mut self, coefficients: &DVector<f64>) -> Self {
         self.pull += &self.information * coefficients;
         self
@@ -111,14 +156,11 @@ impl Equations {
         self
     }
 
-    /// The level with the largest gain; `None` where the score says that there is none to speak of.
-    pub fn most_likely(&self) -> Option<MostLikely> {
+    /// Whether the score says that a level may gain as much as `gain`.
+    pub fn may_gain(&self, gain: f64) -> bool {
         let score = self.pull.norm_squared() - self.information.trace();
         let spread = (2.0 * self.information.norm_squared()).sqrt();
-        if score <= 0.0 || (score / spread).powi(2) < NEARLY * GAIN {
-            return None;
-        }
-        Some(self.spectrum().most_likely())
+        score > 0.0 && (score / spread).powi(2) >= NEARLY * gain
     }
 
     /// Along the axes of the information.
@@ -143,42 +185,50 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// Gain of twice the log-likelihood by a field of a level.
-    fn gain(&self, level_px: f64) -> f64 {
-        let square = level_px.powi(2);
+    /// Gain of twice the log-likelihood by an effect of a level.
+    pub fn gain(&self, level: f64) -> f64 {
+        let square = level.powi(2);
         let of = |(a, h): (&f64, &f64)| square * h * h / (1.0 + square * a) - (square * a).ln_1p();
         self.information.iter().zip(&self.pull).map(of).sum()
     }
 
-    pub fn most_likely(&self) -> MostLikely {
-        let (least, most, factor) = LEVELS;
-        let (mut level_px, mut gain) = (least, self.gain(least));
-        let mut tried = least;
-        while tried < most {
-            tried *= factor;
-            let found = self.gain(tried);
-            if found > gain {
-                (level_px, gain) = (tried, found);
-            }
-        }
-        let variances = self.variances(level_px);
-        let freedom = self.information.component_mul(&variances).sum();
-        MostLikely { level_px, gain, coefficients: &self.axes * self.pull.component_mul(&variances), freedom }
+    /// The level within a range with the largest gain.
+    pub fn most_likely(&self, range: &Range<f64>) -> MostLikely {
+        let gains = levels(range).map(|level| (level, self.gain(level)));
+        let (level, gain) = gains.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((range.start, 0.0));
+        let variances = self.variances(level);
+        MostLikely { level, gain, coefficients: self.coefficients(&variances), freedom: self.freedom(&variances) }
     }
 
     /// Of the coefficients along the axes.
-    pub fn variances(&self, level_px: f64) -> DVector<f64> {
-        self.information.map(|a| (a + level_px.powi(-2)).recip())
+    pub fn variances(&self, level: f64) -> DVector<f64> {
+        self.information.map(|a| (a + level.powi(-2)).recip())
+    }
+
+    /// The coefficients that are most likely where they have these variances.
+    pub fn coefficients(&self, variances: &DVector<f64>) -> DVector<f64> {
+        &self.axes * self.pull.component_mul(variances)
+    }
+
+    /// Trace of what the coefficients take up.
+    pub fn freedom(&self, variances: &DVector<f64>) -> f64 {
+        self.information.component_mul(variances).sum()
     }
 
     /// Length of a way of the coefficients in its standard deviations, squared.
-    pub fn length(&self, way: &DVector<f64>, level_px: f64) -> f64 {
+    pub fn length(&self, way: &DVector<f64>, level: f64) -> f64 {
         let along = self.axes.tr_mul(way);
-        along.component_mul(&along).component_div(&self.variances(level_px)).sum()
+        along.component_mul(&along).component_div(&self.variances(level)).sum()
     }
 }
 
-/// Inner products of the columns of the coefficients with all columns of a view, those of the displacement along x first.
+/// Standard deviations that are tried.
+pub fn levels(range: &Range<f64>) -> impl Iterator<Item = f64> {
+    let (first, end) = (range.start, range.end);
+    std::iter::successors(Some(first), |level| Some(level * FACTOR)).take_while(move |level| *level < end)
+}
+
+/// Inner products of the columns of the coefficients with all columns of a view.
 struct Products {
     by_pose: Matrix6xX<f64>,
     by_form: DMatrix<f64>,
@@ -188,24 +238,31 @@ struct Products {
 
 impl Products {
     /// `None` where a corner has no image.
-    fn new(problem: &JointProblem<'_>, state: &State, index: usize, degree: usize) -> Option<Self> {
+    fn new(problem: &JointProblem<'_>, state: &State, index: usize, effect: Effect) -> Option<Self> {
         let view = &problem.views[index];
         let chain = state.chain(problem, view, &state.corrections[index]);
         let sqrt_weights = problem.sqrt_weights(view);
         let seen = problem.seen(state, view, &sqrt_weights);
         let rows = Rows::new(&seen, &chain.camera_from_target, problem.free.form());
-        let (n, f) = (view.corners.len(), functions(degree));
+        match effect {
+            Effect::Distortion(degree) => Self::of_distortion(&seen, &rows, degree),
+            Effect::Print => Self::of_print(&seen, &rows),
+        }
+    }
+
+    fn of_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option<Self> {
+        let (n, f) = (seen.corners.len(), functions(degree));
         let columns = POSE + rows.count + 1;
-        let size = (state.intrinsics.width, state.intrinsics.height);
+        let size = (seen.intrinsics.width, seen.intrinsics.height);
         let mut functions = DMatrix::zeros(f, n);
         let mut weights = [vec![1.0; n], vec![0.0; n], vec![1.0; n]];
         let mut others: [DMatrix<f64>; 2] = std::array::from_fn(|_| DMatrix::zeros(columns, n));
         let mut row = [Pair::default(); POSE + MAX_FORM + 1];
-        for (i, corner) in view.corners.iter().enumerate() {
+        for (i, corner) in seen.corners.iter().enumerate() {
             rows.fill(i, corner, &mut row).ok()?;
             let basis = DVector::from_vec(basis(size, degree, &corner.px));
             let [[a, b], [c, d]] =
-                sqrt_weights.get(i).map_or([[1.0, 0.0], [0.0, 1.0]], |w| [[w.m11, w.m12], [w.m21, w.m22]]);
+                seen.sqrt_weights.get(i).map_or([[1.0, 0.0], [0.0, 1.0]], |w| [[w.m11, w.m12], [w.m21, w.m22]]);
             for (weights, weight) in weights.iter_mut().zip([a * a + c * c, a * b + c * d, b * b + d * d]) {
                 weights[i] = weight;
             }
@@ -219,7 +276,7 @@ impl Products {
         let weighed = |weights: &[f64]| DMatrix::from_fn(f, n, |i, j| functions[(i, j)] * weights[j]) * &transposed;
         let xx = weighed(&weights[0]);
         // Corners that count alike have the same weight along both axes, and none between them.
-        let (xy, yy) = if sqrt_weights.is_empty() {
+        let (xy, yy) = if seen.sqrt_weights.is_empty() {
             (DMatrix::zeros(f, f), xx.clone())
         } else {
             (weighed(&weights[1]), weighed(&weights[2]))
@@ -233,12 +290,43 @@ impl Products {
         for (half, others) in others.iter().enumerate() {
             by.columns_mut(half * f, f).copy_from(&(others * &transposed));
         }
-        Some(Self {
+        Some(Self::of(&by, own))
+    }
+
+    /// A corner turns with its own point alone.
+    fn of_print(seen: &ViewInput<'_>, rows: &Rows<'_>) -> Option<Self> {
+        let n = seen.board.len();
+        let columns = POSE + rows.count + 1;
+        let mut own = DMatrix::zeros(2 * n, 2 * n);
+        let mut by = DMatrix::zeros(columns, 2 * n);
+        let mut row = [Pair::default(); POSE + MAX_FORM + 1];
+        for (i, corner) in seen.corners.iter().enumerate() {
+            rows.fill(i, corner, &mut row).ok()?;
+            // As it turns with the target's own place, but for the scale.
+            let by_point = [row[0], row[1]].map(|column| column.map(|value| value * seen.shape.scale));
+            let product = |a: &Pair, b: &Pair| a[0] * b[0] + a[1] * b[1];
+            let at = [corner.index, n + corner.index];
+            for (&k, column) in at.iter().zip(&by_point) {
+                for (&l, other) in at.iter().zip(&by_point) {
+                    own[(k, l)] += product(column, other);
+                }
+                for (j, other) in row[..columns].iter().enumerate() {
+                    by[(j, k)] += product(column, other);
+                }
+            }
+        }
+        Some(Self::of(&by, own))
+    }
+
+    /// From the products with the columns of the pose, those of the form and the residual, one under the other.
+    fn of(by: &DMatrix<f64>, own: DMatrix<f64>) -> Self {
+        let last = by.nrows() - 1;
+        Self {
             by_pose: by.fixed_rows::<POSE>(0).into_owned(),
-            by_form: by.rows(POSE, rows.count).into_owned(),
-            by_residual: by.row(columns - 1).transpose(),
+            by_form: by.rows(POSE, last - POSE).into_owned(),
+            by_residual: by.row(last).transpose(),
             own,
-        })
+        }
     }
 }
 
