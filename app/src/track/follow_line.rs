@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use handeye_core::estimate::handeye::HandEye;
 use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::track::{Estimate, Keep, Setup, State, TipGoal, Update};
+use handeye_core::track::{Estimate, Keep, Rest, Setup, State, TipGoal, Update};
 use handeye_sim_link::client::cell::{BoardInView, FollowGoal, FollowMoment, FollowWish as ArmWish};
 
 use crate::model::{FollowStatus, FollowWish};
@@ -30,6 +30,7 @@ pub struct FollowLine {
 struct Inner {
     setup: Option<Setup>,
     newest: Option<Update>,
+    rest: Rest,
     aim: Option<Aim>,
     /// For so long the board may be out of sight before the first goal \[s\].
     patience_s: f64,
@@ -64,12 +65,14 @@ impl FollowLine {
     pub fn set_up(&self, setup: Option<Setup>) {
         let mut inner = self.inner();
         inner.setup = setup;
-        inner.newest = None;
+        (inner.newest, inner.rest) = (None, Rest::default());
     }
 
     /// An image was tracked.
     pub fn see(&self, update: &Update) {
-        self.inner().newest = Some(update.clone());
+        let mut inner = self.inner();
+        inner.rest.see(update);
+        inner.newest = Some(update.clone());
     }
 
     /// Whether the board is seen.
@@ -175,7 +178,7 @@ impl Inner {
             // The clock of a simulation that is started anew goes back.
             return Err(if ahead_s > 0.0 { NoGoal::Now(why) } else { NoGoal::Ever(why) });
         }
-        let now = estimate.carried_to(moment.sim_time_s);
+        let now = self.rest.at().unwrap_or(estimate).carried_to(moment.sim_time_s);
         let keep = match self.aim.take() {
             Some(Aim::Fixed(keep)) => keep,
             Some(Aim::Wished(wish)) => fixed(wish, &now, setup, &moment.base_from_tip),

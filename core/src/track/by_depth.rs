@@ -80,7 +80,7 @@ fn point_at(depth: &DepthImage, corner: &Corner, far_m: f32, calibrated: &Predic
 
 /// Between four pixels of one surface by their inverse depths, which are linear over a plane; next to a pixel without
 /// measurement, or at an edge, the median of the pixels around.
-fn depth_at(depth: &DepthImage, px: Vector2<f64>, far_m: f32) -> Option<f64> {
+pub(super) fn depth_at(depth: &DepthImage, px: Vector2<f64>, far_m: f32) -> Option<f64> {
     let measured = |column: f64, row: f64| {
         if column < 0.0 || row < 0.0 {
             return None;
@@ -109,7 +109,7 @@ fn depth_at(depth: &DepthImage, px: Vector2<f64>, far_m: f32) -> Option<f64> {
     if around.len() < MIN_AROUND { None } else { median_high(around) }
 }
 
-fn reach(off: &[f64]) -> f64 {
+pub(super) fn reach(off: &[f64]) -> f64 {
     (OUTLIER * SIGMA_PER_MEDIAN_SIZE * median_high(off.iter().copied()).unwrap_or(0.0)).max(FLOOR_M)
 }
 

@@ -3,6 +3,7 @@
 //! | part | does |
 //! | --- | --- |
 //! | [`Tracker`] | corners near where they are expected, pose, filter; lost and found |
+//! | [`Rest`] | whether the board rests, so that an arm which follows it does |
 //! | [`Keep`] | where the tip has to be, so that the camera keeps its view of the board |
 //!
 //! Nothing here reads a clock or knows a thread: time is the simulated (or recorded) time of the images. The tracker
@@ -12,6 +13,7 @@
 mod by_depth;
 #[cfg(feature = "opencv")]
 mod corner;
+mod depth_tilt;
 #[cfg(feature = "opencv")]
 pub(crate) mod detection;
 mod error;
@@ -22,6 +24,7 @@ mod goal;
 mod motion;
 mod noise;
 mod pose;
+mod rest;
 #[cfg(feature = "opencv")]
 mod tracker;
 
@@ -36,6 +39,7 @@ use crate::verify::Predictor;
 
 pub use error::TrackError;
 pub use goal::{Keep, TipGoal};
+pub use rest::Rest;
 #[cfg(feature = "opencv")]
 pub use tracker::Tracker;
 
@@ -115,6 +119,16 @@ pub struct BoardDetection {
     pub rms_px: f64,
 }
 
+/// The board in one image by its corners and by how its depths say that it is tilted. Where the board is and how far away is
+/// told by the corners alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WithDepth {
+    /// The board in the base.
+    pub base_from_target: Pose<Base, Target>,
+    /// Its covariance: right perturbation `[t; r]`, m and rad.
+    pub covariance: Matrix6<f64>,
+}
+
 /// The board from depths at its corners: pixel and depth, then camera, tip and base. No model of the lens enters the
 /// distance.
 #[derive(Debug, Clone, PartialEq)]
@@ -167,6 +181,8 @@ pub struct Update {
     pub state: State,
     /// This image alone.
     pub seen: Option<BoardDetection>,
+    /// This image alone, with the tilt by its depths: what the filter takes in; `None` where the depths tell none.
+    pub with_depth: Option<WithDepth>,
     /// The depths of this image alone.
     pub by_depth: Option<ByDepth>,
     /// All images so far; `None` while searching and when lost.

@@ -3,10 +3,12 @@
 use nalgebra::Matrix6;
 
 use super::by_depth::by_depth;
+use super::depth_tilt::DepthTilt;
 use super::detection::{Board, Expected, Eye};
 use super::filter::{BoardPose, Filter};
 use super::noise::CornerNoise;
-use super::{BoardDetection, Estimate, Image, Setup, State, TrackError, Update};
+use super::{BoardDetection, Estimate, Image, Setup, State, TrackError, Update, WithDepth};
+use crate::depth::DepthImage;
 use crate::geometry::frames::{Base, Camera, Pose};
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardPoints;
@@ -65,7 +67,7 @@ impl Tracker {
         setup.motion.check()?;
         let noise = CornerNoise::new(setup.calibrated.uncertainty.as_ref().map(|u| u.noise.corner_px));
         Ok(Self {
-            board: BoardPoints::new(&setup.target.points()),
+            board: setup.calibrated.board(&setup.target),
             setup,
             filter: None,
             elsewhere: None,
@@ -118,7 +120,8 @@ impl Tracker {
         let board = self.look(image, &base_from_camera, filter.as_ref())?;
         self.filter = filter;
         let seen = board.and_then(|board| self.seen(board, &base_from_camera));
-        let believed = seen.as_ref().is_some_and(|seen| self.believe(image.time_s, seen));
+        let tilted = seen.as_ref().zip(image.depth).and_then(|(seen, depth)| self.tilted(image, depth, seen));
+        let believed = seen.as_ref().is_some_and(|seen| self.believe(image.time_s, seen, tilted.as_ref()));
         if self.filter.is_none() {
             self.elsewhere = None;
         }
@@ -130,6 +133,7 @@ impl Tracker {
             time_s: image.time_s,
             state: self.state(if believed { seen.as_ref() } else { None }),
             seen,
+            with_depth: tilted,
             by_depth,
             estimate: self.filter.as_ref().map(Filter::estimate),
         };
@@ -236,10 +240,26 @@ impl Tracker {
         usable.then_some(seen)
     }
 
-    /// Whether a sight is taken for the board; the filter then has it.
-    fn believe(&mut self, time_s: f64, seen: &BoardDetection) -> bool {
+    /// The board by corners and the tilt that depths have.
+    fn tilted(&self, image: &Image<'_>, depth: &DepthImage, seen: &BoardDetection) -> Option<WithDepth> {
+        let Setup { target, calibrated, .. } = &self.setup;
+        let by_corners = seen.camera_from_target.isometry();
+        let tilt = DepthTilt::new(depth, image.far_plane_m, &calibrated.intrinsics, target, by_corners)?;
+        let tilted = tilt.with(by_corners, &seen.covariance)?;
+        let base_from_camera = calibrated.base_from_camera(&image.base_from_tip);
+        let base_from_target = base_from_camera * Pose::from_isometry(tilted.camera_from_target);
+        let covariance = symmetric(&tilted.covariance);
+        let usable = base_from_target.is_finite() && covariance.iter().all(|value| value.is_finite());
+        usable.then_some(WithDepth { base_from_target, covariance })
+    }
+
+    /// Whether a sight is taken for the board; the filter then has it, with the tilt by depth where there is one.
+    fn believe(&mut self, time_s: f64, seen: &BoardDetection, tilted: Option<&WithDepth>) -> bool {
         let centre = self.setup.target.centre();
-        let sight = BoardPose::new(&seen.base_from_target, &seen.covariance, &centre);
+        let sight = match tilted {
+            Some(tilted) => BoardPose::new(&tilted.base_from_target, &tilted.covariance, &centre),
+            None => BoardPose::new(&seen.base_from_target, &seen.covariance, &centre),
+        };
         let start = || Filter::new(self.setup.motion, centre, time_s, &sight);
         let Some(filter) = &mut self.filter else {
             self.filter = Some(start());

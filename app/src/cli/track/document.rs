@@ -101,6 +101,7 @@ fn frame(tracked: &Tracked) -> Value {
         "corners": corners,
         "base_from_target": estimate,
         "by_pnp": update.seen.as_ref().map(|seen| pose(&seen.base_from_target)),
+        "with_depth": update.with_depth.as_ref().map(|both| pose(&both.base_from_target)),
         "by_depth": update.by_depth.as_ref().map(|by_depth| pose(&by_depth.base_from_target)),
         "first_corner_by_depth_m": first_corner,
         "rms_px": update.seen.as_ref().map(|seen| seen.rms_px),

@@ -357,6 +357,7 @@ pub fn tracking() -> Model {
                 time_s,
                 state: State::Tracking { corners: 68, of: 70 },
                 seen: Some(seen),
+                with_depth: None,
                 by_depth: Some(by_depth),
                 estimate: Some(estimate),
             },

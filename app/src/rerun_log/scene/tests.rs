@@ -336,7 +336,7 @@ fn a_board_that_is_lost_is_no_longer_there() {
     };
     let tracked = |estimate: Option<Estimate>, time_s: f64| {
         let state = State::Lost { since_s: 12.0 };
-        let update = Update { time_s, state, seen: None, by_depth: None, estimate };
+        let update = Update { time_s, state, seen: None, with_depth: None, by_depth: None, estimate };
         Entry::Tracked(Arc::new(Tracked { frame: 2, update, latency_s: 0.02, rate_hz: 20.0, error: None, truth: None }))
     };
     let seen = bench.write(&tracked(Some(estimate), 13.0));
