@@ -31,6 +31,35 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
     if parts::gated_ui(ui, blocked(model, hindrance), button).on_hover_text(what).clicked() {
         outbox.send(Command::CalibrateForMe);
     }
+    if let Some(pose) = way_to_board(model, hindrance) {
+        let words = text!("Go to {name}", name = pose).say(language);
+        let what = tr!(
+            language,
+            "The board is not in the image here. This is the first of the taught poses, which look at it: go there, then let it \
+             be calibrated"
+        );
+        if ui.add(Button::new(words).min_size(Vec2::new(0.0, height))).on_hover_text(what).clicked() {
+            outbox.send(Command::GoToTaught(pose.to_owned()));
+        }
+    }
+}
+
+/// The taught pose to go to, where nothing but the board is missing.
+fn way_to_board<'m>(model: &'m Model, hindrance: Option<&'static str>) -> Option<&'m str> {
+    let is_missing = hindrance.is_none() && hindered(model).is_none() && board_is_missing(model);
+    model.taught().first().filter(|_| is_missing).map(|pose| pose.name.as_str())
+}
+
+fn board_is_missing(model: &Model) -> bool {
+    model.board_seen_s.is_none() && model.document().captures.is_empty()
+}
+
+/// What is in the way of moving the arm from pose to pose.
+fn hindered(model: &Model) -> Option<&'static str> {
+    let is_moving = model.motion != Motion::Idle;
+    immovable(model)
+        .or_else(|| unknown_arm(model))
+        .or_else(|| is_moving.then(|| tr!(model.view.language, "The arm is moving: wait until it stands, or stop it")))
 }
 
 /// Whether there is more to reach: no captures yet, or an answer that is not below the goal.
@@ -41,18 +70,12 @@ pub fn is_wanted(model: &Model) -> bool {
 
 /// Why it cannot begin.
 pub fn blocked(model: &Model, hindrance: Option<&'static str>) -> Option<&'static str> {
-    let language = model.view.language;
-    if let Some(why) = hindrance.or_else(|| immovable(model)) {
-        Some(why)
-    } else if let Some(why) = unknown_arm(model) {
-        Some(why)
-    } else if model.motion != Motion::Idle {
-        Some(tr!(language, "The arm is moving: wait until it stands, or stop it"))
-    } else if model.board_seen_s.is_none() && model.document().captures.is_empty() {
-        Some(tr!(language, "The board has not been seen: move the arm until the whole board is in the image"))
-    } else {
-        None
-    }
+    let unseen = || {
+        let what =
+            tr!(model.view.language, "The board has not been seen: move the arm until the whole board is in the image");
+        board_is_missing(model).then_some(what)
+    };
+    hindrance.or_else(|| hindered(model)).or_else(unseen)
 }
 
 /// How far it is and why the arm goes where it goes; afterwards, how it ended.

@@ -71,6 +71,24 @@ fn it_is_offered_where_it_can_begin() {
 }
 
 #[test]
+fn where_the_board_is_not_in_view_the_way_there_is_offered() {
+    let mut unseen = sample::connected();
+    unseen.board_seen_s = None;
+    let first = unseen.taught().first().expect("taught poses").name.clone();
+    let name = format!("Go to {first}");
+    assert_eq!(pane(unseen).click(&name), [Command::GoToTaught(first)]);
+    let is_offered = |change: fn(&mut Model)| {
+        let mut model = sample::connected();
+        model.board_seen_s = None;
+        change(&mut model);
+        pane(model).sees(&name)
+    };
+    assert!(!is_offered(|model| model.board_seen_s = Some(model.now_s)), "it is in view");
+    assert!(!is_offered(|model| model.motion = Motion::Jogging(Jog::Joint { index: 0, forward: true })));
+    assert!(!is_offered(|model| model.planning = true));
+}
+
+#[test]
 fn behind_a_driver_it_is_offered_where_the_chain_of_joints_is_named_and_can_begin_where_that_is_known() {
     let behind = |change: fn(&mut CellFacts)| {
         let mut model = ready();

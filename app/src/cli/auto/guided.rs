@@ -32,6 +32,8 @@ pub struct GuidedSequence<'a, 's> {
     pub around: Surroundings,
     /// Captures that check the answer afterwards.
     pub checks: usize,
+    /// Where to go if the board is not in view from where the arm stands, one after the other.
+    pub towards_board: Vec<(String, Goal)>,
     /// What was found in the captures.
     corners: BTreeMap<CaptureId, Vec<Corner>>,
     image_size: (u32, u32),
@@ -49,6 +51,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         kinematics: &'a ArmKinematics,
         around: Surroundings,
         checks: usize,
+        towards_board: Vec<(String, Goal)>,
     ) -> Self {
         Self {
             sequence,
@@ -56,6 +59,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
             kinematics,
             around,
             checks,
+            towards_board,
             corners: BTreeMap::new(),
             image_size: (0, 0),
             number: 0,
@@ -67,7 +71,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     pub fn run(&mut self) -> Result<Ending, Failure> {
         self.sequence.begin()?;
         let here = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
-        if !self.visit(&Goal::Joints(here.to_vec()), CapturePurpose::Calibrate)? {
+        if !self.visit(&Goal::Joints(here.to_vec()), CapturePurpose::Calibrate)? && !self.look_for_board()? {
             return Err(Failure::failed(anyhow::anyhow!(
                 "the board is not captured from where the arm stands: bring the whole board into the image and begin again"
             )));
@@ -100,6 +104,20 @@ impl<'a, 's> GuidedSequence<'a, 's> {
             self.check(&observations, calibration.as_ref())?;
         }
         Ok(ending)
+    }
+
+    /// Goes to where the board should be in view, on ways that are known to be free; whether it was captured there.
+    fn look_for_board(&mut self) -> Result<bool, Failure> {
+        let goals = std::mem::take(&mut self.towards_board);
+        let among = self.kinematics.among(self.around.clone(), None);
+        self.sequence.cell.arm().keep_clear(Some(among));
+        for (name, goal) in goals {
+            tracing::info!("the board is not in view here: the arm goes to {name}");
+            if self.visit(&goal, CapturePurpose::Calibrate)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Captures that were not designed and never enter the fit.

@@ -203,6 +203,12 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     if plans_here {
         plan = Plan::planned_here(cell.arm(), kinematics.as_ref(), &truth, &around, seed)?;
     }
+    let towards_board = match &kinematics {
+        Some(kinematics) if is_guided && args.connect.is_some() => {
+            Plan::towards_board(cell.arm(), kinematics, &truth, &around, seed)?
+        }
+        _ => Vec::new(),
+    };
     let meta = SessionMeta {
         seeds: args.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
         arm: start::arm(kinematics.as_ref()),
@@ -228,7 +234,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let captured = match (&mut guide, &kinematics) {
         (Some(guide), Some(kinematics)) => {
             let checks = args.guided.check_poses.map_or(CHECKS, |poses| poses as usize);
-            GuidedSequence::new(&mut sequence, guide, kinematics, around, checks).run().map(Some)
+            GuidedSequence::new(&mut sequence, guide, kinematics, around, checks, towards_board).run().map(Some)
         }
         _ => sequence.run().map(|()| None),
     };
