@@ -210,7 +210,7 @@ fn bent(
     work: &Work<'_>,
 ) -> Result<Option<JointSolution>, HandEyeError> {
     let free = Free { warp: true, ..flat.free };
-    let with_warp = JointProblem { free, views, ..*problem };
+    let with_warp = JointProblem { views, free, ..*problem };
     let one_step = joint::warp_ratio(&with_warp, flat, work.cancel)?;
     if !one_step.is_some_and(may_be_shown) {
         return Ok(None);

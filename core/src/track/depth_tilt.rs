@@ -66,7 +66,9 @@ impl DepthTilt {
         }
         // One offset of all depths is none of the tilt.
         let middle = median_high(samples.iter().map(|sample| sample.off_m))?;
-        samples.iter_mut().for_each(|sample| sample.off_m -= middle);
+        for sample in &mut samples {
+            sample.off_m -= middle;
+        }
         keep_near(&mut samples);
         let least = (LEAST * places.len() as f64) as usize;
         let mut plane = None;

@@ -239,7 +239,8 @@ fn examine(
     let beside = fine.iter().any(|h| h.accepted && !h.applied);
     // Where nothing else was found that is the noise that the answer states: one report has one number for it.
     let (robot_m, robot_rad) = match noise.filter(|_| !beside) {
-        Some(noise) => (noise.robot_m, noise.robot_rad),
+        // What depends on the place of the arm is its error as much as what scatters.
+        Some(noise) => (noise.robot_m.hypot(noise.field_m), noise.robot_rad.hypot(noise.field_rad)),
         None => selection.fit.robot_sigma(),
     };
     if robot_m > PLAUSIBLE.0 || robot_rad > PLAUSIBLE.1 {

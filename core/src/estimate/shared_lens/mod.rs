@@ -265,15 +265,14 @@ fn fitted(
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.
     let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));
-    let says = match stated {
-        Some(stated) => stated,
-        None => {
-            let says = LensInformation::of(&problem, solution, work.cancel)?;
-            let print = refined.print.as_ref();
-            let unknown =
-                print.map(|print| print_errors::lens_unknown(&problem, solution, print, work.cancel)).transpose()?;
-            unknown.flatten().and_then(|unknown| says.clone().less(&unknown)).unwrap_or(says)
-        }
+    let says = if let Some(stated) = stated {
+        stated
+    } else {
+        let says = LensInformation::of(&problem, solution, work.cancel)?;
+        let print = refined.print.as_ref();
+        let unknown =
+            print.map(|print| print_errors::lens_unknown(&problem, solution, print, work.cancel)).transpose()?;
+        unknown.flatten().and_then(|unknown| says.clone().less(&unknown)).unwrap_or(says)
     };
     let says = says.widened(factor);
     Ok(Fitted { fit: Fit { refined, factor }, says })

@@ -36,11 +36,16 @@ const GAIN: f64 = 11.6;
 /// RMS per axis that is tried, metres: a ten-thousandth of a millimetre is none, and ten millimetres are another target.
 const LEVELS_M: Range<f64> = 1e-7..1e-2;
 /// Shares of columns and rows, and of smooth errors, that are tried; the rest are errors of each point by itself.
-const SHARES: [f64; 4] = [0.0, 0.3, 0.6, 0.9];
+const SHARES: [f64; 3] = [0.0, 0.45, 0.9];
+/// Points of a target above which no errors are looked for: the equations of twice as many unknowns take a second then, and
+/// the errors of so many points average.
+const MOST_POINTS: usize = 150;
 /// Way over which smooth errors change, in terms of the longer side of the target.
 const SMOOTH: f64 = 0.5;
 /// Weight in terms of the largest below which a level does not count.
 const NO_WEIGHT: f64 = 1e-4;
+/// Part of all weights below which shares do not count in further rounds.
+const UNLIKELY: f64 = 1e-2;
 /// Rounds of errors and fit at the most.
 const MAX_ROUNDS: usize = 8;
 /// Square of the way of the errors in a round, in standard deviations of what the views say of them, below which they stand
@@ -62,6 +67,23 @@ pub struct PrintErrors {
     pub gain: f64,
     /// Part of the residuals that is left once the numbers that the errors take up are off.
     used_up: f64,
+    /// Those that are likely.
+    shares: Vec<Shares>,
+}
+
+/// Of the variance, what columns and rows share and what is smooth over the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shares {
+    lines: f64,
+    smooth: f64,
+}
+
+impl Shares {
+    fn all() -> Vec<Self> {
+        let pairs = SHARES.iter().flat_map(|lines| SHARES.iter().map(move |smooth| (*lines, *smooth)));
+        let possible = pairs.filter(|(lines, smooth)| lines + smooth < 1.0);
+        possible.map(|(lines, smooth)| Self { lines, smooth }).collect()
+    }
 }
 
 impl PrintErrors {
@@ -97,14 +119,14 @@ pub fn with_shown_print(
     without: &JointSolution,
     cancel: &CancelToken,
 ) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
-    if problem.noise.is_some() {
+    if problem.noise.is_some() || problem.board.len() > MOST_POINTS {
         return Ok(None);
     }
     let Some(equations) = Equations::new(problem, without, Effect::Print, cancel)? else { return Ok(None) };
     if !equations.may_gain(GAIN) {
         return Ok(None);
     }
-    let posterior = Posterior::of(&equations, &Kinds::of(problem.board.drawn()), cancel)?;
+    let posterior = Posterior::of(&equations, &Kinds::of(problem.board.drawn(), &Shares::all()), cancel)?;
     if posterior.gain < GAIN {
         return Ok(None);
     }
@@ -125,7 +147,7 @@ pub fn settled(
     mut solution: JointSolution,
     cancel: &CancelToken,
 ) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
-    let kinds = Kinds::of(problem.board.drawn());
+    let kinds = Kinds::of(problem.board.drawn(), &shown.shares);
     for round in 1..=MAX_ROUNDS {
         let board = shown.on(problem.board);
         let with = JointProblem { board: &board, ..*problem };
@@ -177,7 +199,7 @@ fn at_end(
     let Some(equations) = Equations::new(problem, solution, Effect::Print, cancel)? else { return Ok(None) };
     let equations = equations.beyond(&shown.coefficients()).times(shown.used_up);
     let back: Vec<Vector2<f64>> = shown.errors_m.iter().map(|error| -error).collect();
-    let kinds = Kinds::of(problem.board.displaced(&back).drawn());
+    let kinds = Kinds::of(problem.board.displaced(&back).drawn(), &shown.shares);
     let posterior = Posterior::of(&equations, &kinds, cancel)?;
     Ok(Some((equations, posterior)))
 }
@@ -202,11 +224,11 @@ pub fn with_its_error(
 
 /// Roots of the covariances `K`: `K = B Bᵀ`.
 struct Kinds {
-    roots: Vec<DMatrix<f64>>,
+    roots: Vec<(Shares, DMatrix<f64>)>,
 }
 
 impl Kinds {
-    fn of(points: &[Point3<f64>]) -> Self {
+    fn of(points: &[Point3<f64>], shares: &[Shares]) -> Self {
         let n = points.len();
         let rigid = rigid(points);
         let side = points.iter().flat_map(|a| points.iter().map(move |b| (a - b).abs().max())).fold(0.0, f64::max);
@@ -225,14 +247,13 @@ impl Kinds {
             (-0.5 * apart * apart).exp()
         });
         let single = together(&|_, i, j| f64::from(u8::from(i == j)));
-        let shares = SHARES.iter().flat_map(|line| SHARES.iter().map(move |smooth| (*line, *smooth)));
-        let roots =
-            shares.filter(|(of_lines, of_smooth)| of_lines + of_smooth < 1.0).filter_map(|(of_lines, of_smooth)| {
-                let kernel = &lines * of_lines + &smooth * of_smooth + &single * (1.0 - of_lines - of_smooth);
-                // What is rigid has no error at all, which is no number to divide by.
-                let least = DMatrix::identity(2 * n, 2 * n) * NO_ERROR;
-                Cholesky::new(kernel + least).map(|factor| factor.l())
-            });
+        let roots = shares.iter().filter_map(|shares| {
+            let rest = 1.0 - shares.lines - shares.smooth;
+            let kernel = &lines * shares.lines + &smooth * shares.smooth + &single * rest;
+            // What is rigid has no error at all, which is no number to divide by.
+            let least = DMatrix::identity(2 * n, 2 * n) * NO_ERROR;
+            Cholesky::new(kernel + least).map(|factor| (*shares, factor.l()))
+        });
         Self { roots: roots.collect() }
     }
 }
@@ -276,12 +297,13 @@ struct Posterior {
     gain: f64,
     /// Trace of what the errors take up.
     freedom: f64,
+    likely: Vec<Shares>,
 }
 
 impl Posterior {
     fn of(equations: &Equations, kinds: &Kinds, cancel: &CancelToken) -> Result<Self, HandEyeError> {
         let mut spectra: Vec<(&DMatrix<f64>, Spectrum)> = Vec::with_capacity(kinds.roots.len());
-        for root in &kinds.roots {
+        for (_, root) in &kinds.roots {
             if cancel.is_cancelled() {
                 return Err(HandEyeError::Cancelled);
             }
@@ -298,7 +320,12 @@ impl Posterior {
         let sum: f64 = gains.iter().flatten().map(|(_, of)| weight(*of)).filter(|weight| *weight > NO_WEIGHT).sum();
         let n = equations.pull.len();
         let (mut mean, mut covariance, mut freedom) = (DVector::zeros(n), DMatrix::zeros(n, n), 0.0);
-        for ((root, spectrum), gains) in spectra.iter().zip(&gains) {
+        let mut likely = Vec::new();
+        for (((root, spectrum), gains), (shares, _)) in spectra.iter().zip(&gains).zip(&kinds.roots) {
+            let of_shares: f64 = gains.iter().map(|(_, of)| weight(*of)).sum();
+            if of_shares > UNLIKELY * sum {
+                likely.push(*shares);
+            }
             let mut variances = DVector::zeros(n);
             let axes = *root * &spectrum.axes;
             for (level, of) in gains {
@@ -318,7 +345,7 @@ impl Posterior {
             }
         }
         covariance.ger(-1.0, &mean, &mean, 1.0);
-        Ok(Self { mean, covariance, level_m, gain, freedom })
+        Ok(Self { mean, covariance, level_m, gain, freedom, likely })
     }
 
     fn sigma_m(&self) -> Vec<f64> {
@@ -336,6 +363,7 @@ impl Posterior {
             level_m: self.level_m,
             gain,
             used_up,
+            shares: self.likely.clone(),
         })
     }
 }
