@@ -28,6 +28,7 @@ mod sample;
 mod shared;
 mod solve;
 pub(crate) mod target;
+mod towards_board;
 mod track;
 
 use std::io::{IsTerminal as _, Write as _};

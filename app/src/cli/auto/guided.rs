@@ -15,6 +15,7 @@ use handeye_core::targets::observation::Corner;
 use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::super::Failure;
+use super::super::towards_board::TowardsBoard;
 use super::sequence::PoseSequence;
 use crate::limits;
 use crate::model::CapturePurpose;
@@ -33,7 +34,7 @@ pub struct GuidedSequence<'a, 's> {
     /// Captures that check the answer afterwards.
     pub checks: usize,
     /// Where to go if the board is not in view from where the arm stands, one after the other.
-    pub towards_board: Vec<(String, Goal)>,
+    pub towards_board: Vec<TowardsBoard>,
     /// What was found in the captures.
     corners: BTreeMap<CaptureId, Vec<Corner>>,
     image_size: (u32, u32),
@@ -51,7 +52,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         kinematics: &'a ArmKinematics,
         around: Surroundings,
         checks: usize,
-        towards_board: Vec<(String, Goal)>,
+        towards_board: Vec<TowardsBoard>,
     ) -> Self {
         Self {
             sequence,
@@ -111,9 +112,9 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         let goals = std::mem::take(&mut self.towards_board);
         let among = self.kinematics.among(self.around.clone(), None);
         self.sequence.cell.arm().keep_clear(Some(among));
-        for (name, goal) in goals {
+        for TowardsBoard { name, joints } in goals {
             tracing::info!("the board is not in view here: the arm goes to {name}");
-            if self.visit(&goal, CapturePurpose::Calibrate)? {
+            if self.visit(&Goal::Joints(joints.to_vec()), CapturePurpose::Calibrate)? {
                 return Ok(true);
             }
         }

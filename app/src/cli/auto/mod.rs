@@ -22,6 +22,7 @@ use super::cell::SceneArg;
 use super::output::Output;
 use super::{Failure, ObjectArgs, RerunArg, arm_arg, box_arg, heading, out, record, rerun_arg, solve};
 use crate::cli::auto::sequence::PoseSequence;
+use crate::cli::towards_board::TowardsBoard;
 use crate::model::{CaptureOptions, Goal, Step, Truth};
 use crate::rerun_log::{Entry, Pace, RerunChoice};
 use crate::session::start;
@@ -68,6 +69,9 @@ pub struct AutoArgs {
     /// Run the built-in cell like real time instead of as fast as it can.
     #[arg(long, help_heading = heading::CELL)]
     real_time: bool,
+    /// Leave the simulation running at the end, also where it was this command that started it. Otherwise it is left as it was.
+    #[arg(long, requires = "connect", help_heading = heading::CELL)]
+    leave_running: bool,
     /// Images that are averaged for each capture.
     #[arg(long, value_name = "N", default_value_t = CaptureOptions::default().frames, value_parser = clap::value_parser!(u32).range(1..=64), help_heading = heading::POSES)]
     frames: u32,
@@ -205,7 +209,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     }
     let towards_board = match &kinematics {
         Some(kinematics) if is_guided && args.connect.is_some() => {
-            Plan::towards_board(cell.arm(), kinematics, &truth, &around, seed)?
+            TowardsBoard::all(cell.arm(), kinematics, &truth, &around)?
         }
         _ => Vec::new(),
     };
@@ -243,7 +247,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let ended = cell.arm().stop().and_then(|()| {
         let sim = cell.arm().sim();
         sim.set_stepping(false)?;
-        if ran_before { Ok(()) } else { sim.stop_simulation_and_wait() }
+        if ran_before || args.leave_running { Ok(()) } else { sim.stop_simulation_and_wait() }
     });
     if captured.is_err() && !session.document().captures.is_empty() {
         let (count, folder) = (session.document().captures.len(), folder.display());

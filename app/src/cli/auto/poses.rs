@@ -17,9 +17,6 @@ const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// How many views `--poses auto` plans.
 const PLANNED_VIEWS: usize = 20;
 
-/// How many views are tried where the board is not in view.
-const VIEWS_OF_BOARD: usize = 3;
-
 /// The ten reference poses.
 pub const REFERENCE: &str = "seed10";
 /// Poses that are chosen on the way.
@@ -112,37 +109,6 @@ impl Plan {
         let views =
             kinematics.views_unlike(&board, &[], &here, around, PLANNED_VIEWS, seed).map_err(Failure::failed)?;
         Ok(Self { start_joints: None, goals: named(views.iter()), limits: limits::SEQUENCE })
-    }
-
-    /// Where a simulated arm goes that does not see the board from where it stands: views of the board where its scene says where
-    /// it is, and where the UR5 of the reference scene begins.
-    pub fn towards_board(
-        arm: &mut Arm,
-        kinematics: &ArmKinematics,
-        truth: &GroundTruth,
-        around: &Surroundings,
-        seed: u64,
-    ) -> Result<Vec<(String, Goal)>, Failure> {
-        let base_from_target = match truth.base_from_target {
-            Some(published) => Some(published),
-            None => arm.base_from_board(&BOARD).map_err(Failure::failed)?,
-        };
-        let GroundTruth { tip_from_camera, intrinsics, .. } = *truth;
-        let here = arm.joint_values().map_err(Failure::failed)?;
-        let board = base_from_target.map(|place| BoardInView {
-            base_from_target: place,
-            target: BOARD,
-            intrinsics,
-            tip_from_camera,
-        });
-        let views = board.map(|board| kinematics.views_unlike(&board, &[], &here, around, VIEWS_OF_BOARD, seed));
-        // A board out of reach has no views.
-        let views = views.and_then(Result::ok).unwrap_or_default();
-        let views = views.iter().map(|joints| ("a view of the board".to_owned(), Goal::Joints(joints.to_vec())));
-        let reference = TaughtPoses::parse(Path::new(REFERENCE), REFERENCE_POSES).map_err(Failure::failed)?;
-        let start = reference.start_joints_rad.filter(|_| kinematics.is_ur5());
-        let start = start.map(|joints| ("the start of the reference poses".to_owned(), Goal::Joints(joints)));
-        Ok(views.chain(start).collect())
     }
 
     /// None at all: the arm begins where it stands.

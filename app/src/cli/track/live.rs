@@ -19,6 +19,7 @@ use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, Sim, Simu
 use serde_json::{Value, json};
 
 use crate::cli::late::Late;
+use crate::cli::towards_board::TowardsBoard;
 use crate::cli::{Failure, record};
 use crate::limits;
 use crate::model::{FollowStatus, FollowWish, Step, Tracked};
@@ -35,6 +36,9 @@ const PROGRESS_S: f64 = 2.0;
 
 /// The speed of the way to where there is room, as a share of [`limits::SEQUENCE`]: as in the window.
 const SHARE_OF_SPEED: f64 = 0.25;
+
+/// How long the board is looked for from where the arm stands, before the arm goes to where it should be in view.
+const LOOKED_FOR: Duration = Duration::from_secs(2);
 
 /// What the arm does about the board.
 #[derive(Debug, Clone, Copy)]
@@ -141,13 +145,19 @@ impl Live {
         // It lives until the arm stands: an arm that follows looks at what is tracked.
         let mut tracking = Tracking::new(job.setup.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
         let tracking = &mut tracking;
-        let Self { mut arm, feed } = self;
+        let Self { mut arm, mut feed } = self;
         let wish = match job.task {
             Task::Watch => {
-                return Self::watch(feed, tracking, job, &line, cancel, &|| false, taken).map(drop);
+                return Self::watch(&mut feed, tracking, job, &line, cancel, &|| false, taken).map(drop);
             }
             Task::Reach { index, stand_off_m } => {
-                let newest = Self::watch(feed, tracking, job, &line, cancel, &|| false, taken)?;
+                let mut newest = Self::watch(&mut feed, tracking, job, &line, cancel, &|| false, taken)?;
+                if newest.is_none() && job.own_cell.is_none() && !cancel.is_cancelled() {
+                    look_for_board(&mut arm, cancel, &mut || {
+                        newest = Self::watch(&mut feed, tracking, job, &line, cancel, &|| false, taken)?;
+                        Ok(newest.is_some())
+                    })?;
+                }
                 return reach(&mut arm, job, newest, index, stand_off_m, cancel);
             }
             Task::Follow(wish) => wish,
@@ -155,10 +165,11 @@ impl Live {
         let end = CancelToken::default();
         line.begin(wish);
         let kinematics = arm.kinematics().map_err(Failure::failed)?.map_err(Failure::failed)?;
-        let follower = Follower { arm, kinematics, wish, line: Arc::clone(&line), end: end.clone() };
+        let looks_for_board = job.own_cell.is_none();
+        let follower = Follower { arm, kinematics, wish, line: Arc::clone(&line), end: end.clone(), looks_for_board };
         let arm_thread =
             Builder::new().name("follow".to_owned()).spawn(move || follower.run()).map_err(Failure::failed)?;
-        let watched = Self::watch(feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), taken);
+        let watched = Self::watch(&mut feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), taken);
         end.cancel();
         let followed = arm_thread
             .join()
@@ -208,7 +219,7 @@ impl Live {
     }
 
     fn watch(
-        mut feed: CameraFeed,
+        feed: &mut CameraFeed,
         tracking: &mut Tracking,
         job: &Job<'_>,
         line: &FollowLine,
@@ -218,7 +229,8 @@ impl Live {
     ) -> Result<Option<Estimate>, Failure> {
         let Taken { publish, summary } = taken;
         let frames = match job.task {
-            Task::Reach { .. } => Some(job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
+            // Of each place where the board is looked for.
+            Task::Reach { .. } => Some(summary.frames + job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
             Task::Watch | Task::Follow(_) => job.frames,
         };
         let mut newest = None;
@@ -312,15 +324,62 @@ struct Follower {
     wish: FollowWish,
     line: Arc<FollowLine>,
     end: CancelToken,
+    /// Whether the arm goes to where the board should be in view.
+    looks_for_board: bool,
+}
+
+/// Whether the board is seen, after waiting for it; without a limit until it is seen or following is cancelled.
+fn is_seen_within(line: &FollowLine, end: &CancelToken, limit: Option<Duration>) -> bool {
+    let began = Instant::now();
+    while !line.is_seen() && !end.is_cancelled() && limit.is_none_or(|limit| began.elapsed() < limit) {
+        std::thread::sleep(LOOK);
+    }
+    line.is_seen()
+}
+
+/// Has a simulated arm that does not see the board go to where it should be in view, on ways that are known to be free, until
+/// it `is_seen`.
+fn look_for_board(
+    arm: &mut Arm,
+    cancel: &CancelToken,
+    is_seen: &mut dyn FnMut() -> Result<bool, Failure>,
+) -> Result<(), Failure> {
+    let Ok(kinematics) = arm.kinematics().map_err(Failure::failed)? else { return Ok(()) };
+    let around = arm.surroundings(&kinematics).map_err(Failure::failed)?.all();
+    let truth = arm.ground_truth().map_err(Failure::failed)?;
+    let places = TowardsBoard::all(arm, &kinematics, &truth, &around)?;
+    arm.keep_clear(Some(kinematics.among(around, None)));
+    for TowardsBoard { name, joints } in places {
+        tracing::info!("the board is not in view here: the arm goes to {name}");
+        let limits = limits::of_joints(&limits::SEQUENCE, SHARE_OF_SPEED, arm.info().joint_kinds());
+        match arm.move_to_joints(&joints, &limits, cancel) {
+            Err(error @ (LinkError::Unreached { .. } | LinkError::InTheWay { .. })) => {
+                tracing::warn!("the arm does not go to {name}: {error}");
+                continue;
+            }
+            Err(LinkError::Cancelled { .. }) => return Ok(()),
+            moved => moved.map_err(Failure::failed)?,
+        }
+        if is_seen()? {
+            break;
+        }
+    }
+    Ok(())
 }
 
 impl Follower {
     /// Follows until it is cancelled or following ends by itself; the arm is at rest then.
     fn run(mut self) -> Result<FollowEnd, Failure> {
         // Nothing to follow before the board has been seen.
-        while !self.line.is_seen() && !self.end.is_cancelled() {
-            std::thread::sleep(LOOK);
+        is_seen_within(&self.line, &self.end, Some(LOOKED_FOR));
+        while !self.line.is_seen() && !self.end.is_cancelled() && !self.is_running()? {
+            is_seen_within(&self.line, &self.end, Some(LOOKED_FOR));
         }
+        if !self.line.is_seen() && self.looks_for_board && !self.end.is_cancelled() {
+            let (line, end) = (Arc::clone(&self.line), self.end.clone());
+            look_for_board(&mut self.arm, &end, &mut || Ok(is_seen_within(&line, &end, Some(LOOKED_FOR))))?;
+        }
+        is_seen_within(&self.line, &self.end, None);
         let standing = self.arm.surroundings(&self.kinematics).map_err(Failure::failed)?;
         let among = self.kinematics.among(standing.around.clone(), None);
         self.arm.keep_clear(Some(among.clone()));
@@ -330,6 +389,11 @@ impl Follower {
         let Self { mut arm, kinematics, line, end, .. } = self;
         let mut wanted = |moment: &FollowMoment| if end.is_cancelled() { ArmWish::End } else { line.wish(moment) };
         arm.follow(&kinematics, &FollowLimits::default(), &mut wanted).map_err(Failure::failed)
+    }
+
+    fn is_running(&mut self) -> Result<bool, Failure> {
+        let state = self.arm.sim().get_simulation_state().map_err(Failure::failed)?;
+        Ok(state == SimulationState::Running)
     }
 
     /// Moves to the nearest place from which the arm can go along with the board, where it cannot from here.
