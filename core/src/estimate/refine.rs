@@ -111,7 +111,7 @@ pub fn refine(
         }
         estimate_screened(problem, &solution.as_start(), own, work.cancel)
     };
-    if !warp && let Some(bent) = bent(&problem, &screened.kept_views(), &screened.solution, work)? {
+    if !warp && let Some(bent) = bent(&problem, &screened.kept_views(), &screened.solution, None, work)? {
         screened = again(&JointProblem { free: bent.free, ..problem }, bent, screened)?;
     }
     let (print, with_print) = printed(&problem, &screened, work)?.unzip();
@@ -202,11 +202,13 @@ pub fn kept_problem<'a>(problem: &JointProblem<'a>, views: &'a [View], solution:
     JointProblem { views, free: solution.free, ..*problem }
 }
 
-/// The estimate with a bent target, when the data support one.
+/// The estimate with a bent target, when the data support one. `print` are the errors that the target of the problem has in its
+/// plane.
 fn bent(
     problem: &JointProblem<'_>,
     views: &[View],
     flat: &JointSolution,
+    print: Option<&PrintErrors>,
     work: &Work<'_>,
 ) -> Result<Option<JointSolution>, HandEyeError> {
     let free = Free { warp: true, ..flat.free };
@@ -224,7 +226,11 @@ fn bent(
         return Ok(None);
     }
     let stated = joint::with_stated_error(&with_warp, solution, work.cancel);
-    let Some(solution) = determined(stated)? else { return Ok(None) };
+    let Some(mut solution) = determined(stated)? else { return Ok(None) };
+    if let Some(print) = print {
+        // What the print is not known to is not known of the bend either.
+        solution = print_errors::with_its_error(&with_warp, solution, &mut print.clone(), work.cancel)?;
+    }
     let Some(covariance) = solution.warp_covariance() else { return Ok(None) };
     let metres_per_px = solution.reference_point.coords.norm() / solution.intrinsics.fx;
     let deflection = Deflection {
@@ -256,7 +262,8 @@ fn printed(
     let Some(solution) = determined(joint::fit(&flat, &start, work.cancel))? else { return Ok(shown) };
     let Some((print, solution)) = with_shown_print(&flat, &solution, work.cancel)? else { return Ok(shown) };
     let board = print.on(problem.board);
-    let is_bent = bent(&JointProblem { board: &board, ..flat }, &views, &solution, work)?.is_some();
+    let with_print = JointProblem { board: &board, ..flat };
+    let is_bent = bent(&with_print, &views, &solution, Some(&print), work)?.is_some();
     Ok(if is_bent { shown } else { Some((print, solution)) })
 }
 

@@ -24,6 +24,7 @@ mod slow {
     mod asleep;
     mod auto;
     mod coppeliasim_only;
+    mod coppeliasim_scene;
     mod driven_cells;
     mod drivers;
     mod first_user;

@@ -138,7 +138,7 @@ pub fn diagnose<'a>(
     work: impl Into<Work<'a>>,
 ) -> Diagnosis {
     let work = work.into();
-    let repaired = calibration.as_deref().and_then(|calibration| renumbered(observations, calibration));
+    let repaired = calibration.as_deref().and_then(|calibration| as_found(observations, calibration));
     let observations = repaired.as_ref().unwrap_or(observations);
     let mut diagnosis = Diagnosis { findings: Vec::new(), hypotheses: Vec::new(), untested: None };
     if let Err(why) = examine(observations, calibration.as_deref_mut(), &mut diagnosis, &work) {
@@ -170,15 +170,28 @@ pub fn diagnose<'a>(
     diagnosis
 }
 
-/// The observations with the corners numbered as the calibration found them to be; `None` when that changes nothing.
-fn renumbered(observations: &Observations, calibration: &Calibration) -> Option<Observations> {
-    if calibration.views.iter().all(|view| view.quarter_turns == 0) {
+/// The observations with the corners numbered as the calibration found them to be, and where they would be if the target were
+/// printed as drawn; `None` when that changes nothing.
+fn as_found(observations: &Observations, calibration: &Calibration) -> Option<Observations> {
+    let print = calibration.joint.as_ref().and_then(|joint| joint.print.as_ref()).zip(calibration.intrinsics());
+    if print.is_none() && calibration.views.iter().all(|view| view.quarter_turns == 0) {
         return None;
     }
+    let points = observations.target.points();
     let mut observations = observations.clone();
     for (view, result) in observations.views.iter_mut().zip(&calibration.views) {
-        if let Some(corners) = view.corners.as_mut().filter(|_| result.quarter_turns != 0) {
+        let Some(corners) = view.corners.as_mut() else { continue };
+        if result.quarter_turns != 0 {
             observation::renumber(corners, &observations.target, result.quarter_turns);
+        }
+        let Some(((print, lens), pose)) = print.zip(result.camera_from_target) else { continue };
+        for corner in corners {
+            let drawn = points[corner.index];
+            let printed = drawn + print.errors_m[corner.index].push(0.0);
+            let [drawn, printed] = [drawn, printed].map(|point| lens.project(&(pose.isometry() * point)));
+            if let (Ok(drawn), Ok(printed)) = (drawn, printed) {
+                corner.px += drawn - printed;
+            }
         }
     }
     Some(observations)
