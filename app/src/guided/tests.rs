@@ -1,4 +1,7 @@
+use std::sync::Arc;
+
 use handeye_core::plan::guided::{Ending, GuidedOptions, Why};
+use handeye_core::project::taught_poses::TaughtPose;
 
 use super::pane::{begin_ui, progress_ui};
 use super::state::{GuidedProgress, Waits};
@@ -9,6 +12,7 @@ use crate::model::{
     self, ArmDoubt, AskedMove, BoxState, CapturePurpose, CellFacts, CellSource, Jog, LinkState, Model, Motion,
     MotionGoal, Moves, PoseSequence, StopOutcome, WorkBox,
 };
+use crate::taught::update::reference_poses;
 use crate::text::{Language, Text};
 
 const BUTTON: &str = "Calibrate for me";
@@ -72,20 +76,24 @@ fn it_is_offered_where_it_can_begin() {
 
 #[test]
 fn where_the_board_is_not_in_view_the_way_there_is_offered() {
-    let mut unseen = sample::connected();
-    unseen.board_seen_s = None;
-    let first = unseen.taught().first().expect("taught poses").name.clone();
-    let name = format!("Go to {first}");
-    assert_eq!(pane(unseen).click(&name), [Command::GoToTaught(first)]);
-    let is_offered = |change: fn(&mut Model)| {
+    let unseen = || {
         let mut model = sample::connected();
+        let cell = model.taught_on(model.document().meta.target);
+        let poses = reference_poses().into_iter().map(|pose| TaughtPose { cell: cell.clone(), ..pose });
+        Arc::make_mut(&mut model.session.document).taught = poses.collect();
         model.board_seen_s = None;
+        model
+    };
+    assert_eq!(pane(unseen()).click("Go to P1"), [Command::GoToTaught("P1".to_owned())]);
+    let is_offered = |change: fn(&mut Model)| {
+        let mut model = unseen();
         change(&mut model);
-        pane(model).sees(&name)
+        pane(model).sees("Go to P1")
     };
     assert!(!is_offered(|model| model.board_seen_s = Some(model.now_s)), "it is in view");
     assert!(!is_offered(|model| model.motion = Motion::Jogging(Jog::Joint { index: 0, forward: true })));
     assert!(!is_offered(|model| model.planning = true));
+    assert!(!is_offered(|model| Arc::make_mut(&mut model.session.document).taught.clear()), "there is no such pose");
 }
 
 #[test]

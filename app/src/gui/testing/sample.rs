@@ -72,14 +72,21 @@ fn corners(n: u32) -> Vec<Corner> {
 
 /// The same of a board elsewhere.
 fn corners_at(n: u32, chain: &Pose<Camera, Target>) -> Vec<Corner> {
-    let wiggle = |i: usize, phase: f64| 0.07 * (f64::from(n) * 12.9 + i as f64 * 78.2 + phase).sin();
+    // Independent from corner to corner and from view to view: a pattern would be an error of the print.
+    let noise_px = |i: usize, axis: u64| {
+        let mut bits = (u64::from(n) << 32 | (i as u64) << 1 | axis).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        for factor in [0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb] {
+            bits = (bits ^ (bits >> 30)).wrapping_mul(factor);
+        }
+        ((bits >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 0.05 * 12_f64.sqrt()
+    };
     BOARD
         .points()
         .iter()
         .enumerate()
         .map(|(index, point)| {
             let px = intrinsics().project(&(chain.isometry() * point)).expect("the board is in front of the camera");
-            Corner::new(index, px + Vector2::new(wiggle(index, 0.0), wiggle(index, 1.0)))
+            Corner::new(index, px + Vector2::new(noise_px(index, 0), noise_px(index, 1)))
         })
         .collect()
 }

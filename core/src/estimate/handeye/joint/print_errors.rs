@@ -110,7 +110,8 @@ impl PrintErrors {
 }
 
 /// The estimate from the views of a problem with the print errors that they show; `without` is that without them. The target of
-/// the problem is that of the drawing. `None` also when the noise levels are given.
+/// the problem is that of the drawing. `None` also when the noise levels are given, and when the lens is: one that was given
+/// wrongly would be taken for a print.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
@@ -119,7 +120,7 @@ pub fn with_shown_print(
     without: &JointSolution,
     cancel: &CancelToken,
 ) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
-    if problem.noise.is_some() || problem.board.len() > MOST_POINTS {
+    if problem.noise.is_some() || !without.free.intrinsics || problem.board.len() > MOST_POINTS {
         return Ok(None);
     }
     let Some(equations) = Equations::new(problem, without, Effect::Print, cancel)? else { return Ok(None) };
