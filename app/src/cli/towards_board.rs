@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use handeye_core::geometry::arm::JointValues;
+use handeye_core::geometry::frames::{Base, Pose, Target};
 use handeye_core::plan::Surroundings;
 use handeye_core::project::taught_poses::TaughtPoses;
 use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
@@ -14,6 +15,14 @@ use crate::session::start::{BOARD, REFERENCE_POSES};
 const VIEWS: usize = 3;
 /// Chooses them; any does.
 const SEED: u64 = 1;
+
+/// Where a cell has its board: by its truth where it publishes that, and else by its scene; `None` where neither knows.
+pub fn base_from_target(arm: &mut Arm, truth: &GroundTruth) -> Result<Option<Pose<Base, Target>>, Failure> {
+    match truth.base_from_target {
+        Some(published) => Ok(Some(published)),
+        None => arm.base_from_board(&BOARD).map_err(Failure::failed),
+    }
+}
 
 /// A place from which the board should be in view.
 pub struct TowardsBoard {
@@ -31,10 +40,7 @@ impl TowardsBoard {
         truth: &GroundTruth,
         around: &Surroundings,
     ) -> Result<Vec<Self>, Failure> {
-        let base_from_target = match truth.base_from_target {
-            Some(published) => Some(published),
-            None => arm.base_from_board(&BOARD).map_err(Failure::failed)?,
-        };
+        let base_from_target = base_from_target(arm, truth)?;
         let GroundTruth { tip_from_camera, intrinsics, .. } = *truth;
         let here = arm.joint_values().map_err(Failure::failed)?;
         let views = base_from_target.and_then(|base_from_target| {

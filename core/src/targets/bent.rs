@@ -48,7 +48,7 @@ impl BoardPoints {
         Self { drawn: points.to_vec(), sag }
     }
 
-    /// The same target whose points are printed off their places in its plane by so much, metres.
+    /// The same target with its points displaced in its plane by print errors, metres.
     #[must_use]
     pub fn displaced(&self, errors_m: &[Vector2<f64>]) -> Self {
         let moved = |(point, error): (&Point3<f64>, &Vector2<f64>)| point + error.push(0.0);

@@ -89,8 +89,8 @@ impl DepthTilt {
         }
         let plane = plane?;
         let count = samples.len() as f64;
-        let rms = |sample: &Sample| (plane.inverse.dot(&sample.ray) - sample.inverse).powi(2);
-        let variance = samples.iter().map(rms).sum::<f64>() / (count - 3.0);
+        let squared = |sample: &Sample| (plane.inverse.dot(&sample.ray) - sample.inverse).powi(2);
+        let variance = samples.iter().map(squared).sum::<f64>() / (count - 3.0);
         let by_chance = plane.information.try_inverse()? * (variance * count);
         let middle = camera_from_target * target.centre();
         let ray = middle.coords / middle.z;

@@ -8,7 +8,7 @@ use handeye_core::project::taught_poses::{Goal, MotionLimits, TaughtPoses};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
 use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 
-use super::super::Failure;
+use super::super::{Failure, towards_board};
 use crate::limits;
 use crate::session::start::{BOARD, REFERENCE_POSES};
 
@@ -94,15 +94,12 @@ impl Plan {
                 "planned views take an arm whose chain is known (docs/arms.md): give the poses by a file, --poses FILE"
             ))
         })?;
-        let base_from_target = match truth.base_from_target {
-            Some(published) => published,
-            None => arm.base_from_board(&BOARD).map_err(Failure::failed)?.ok_or_else(|| {
-                Failure::failed(anyhow::anyhow!(
-                    "the position of the board is not known here, so that no views of it can be planned: name it by --object \
-                     board=PATH, or bring it into the image and use --poses guided"
-                ))
-            })?,
-        };
+        let base_from_target = towards_board::base_from_target(arm, truth)?.ok_or_else(|| {
+            Failure::failed(anyhow::anyhow!(
+                "the position of the board is not known here, so that no views of it can be planned: name it by --object \
+                 board=PATH, or bring it into the image and use --poses guided"
+            ))
+        })?;
         let GroundTruth { tip_from_camera, intrinsics, .. } = *truth;
         let board = BoardInView { base_from_target, target: BOARD, intrinsics, tip_from_camera };
         let here = arm.joint_values().map_err(Failure::failed)?;

@@ -28,7 +28,7 @@ fn number(value: &Value) -> f64 {
 
 /// An arm that sees nothing and a board that is not as drawn, from first to last.
 #[test]
-fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_followed_without_trembling() {
+fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_followed_at_rest() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = scene();
     // Only what CoppeliaSim has.

@@ -61,8 +61,6 @@ pub struct PrintErrors {
     pub errors_m: Vec<Vector2<f64>>,
     /// Standard deviation of each of them per axis, metres.
     pub sigma_m: Vec<f64>,
-    /// Most likely RMS of such errors per axis, metres.
-    pub level_m: f64,
     /// Gain of twice the log-likelihood over a target as drawn.
     pub gain: f64,
     /// Part of the residuals that is left once the numbers that the errors take up are off.
@@ -293,8 +291,7 @@ fn without(rigid: &DMatrix<f64>, kernel: DMatrix<f64>) -> DMatrix<f64> {
 struct Posterior {
     mean: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// The most likely one.
-    level_m: f64,
+    /// Of the most likely kind and level.
     gain: f64,
     /// Trace of what the errors take up.
     freedom: f64,
@@ -314,8 +311,7 @@ impl Posterior {
             .iter()
             .map(|(_, spectrum)| levels(&LEVELS_M).map(|level| (level, spectrum.gain(level))).collect())
             .collect();
-        let most = gains.iter().flatten().copied().max_by(|a, b| a.1.total_cmp(&b.1));
-        let (level_m, gain) = most.unwrap_or((LEVELS_M.start, 0.0));
+        let gain = gains.iter().flatten().map(|(_, of)| *of).max_by(f64::total_cmp).unwrap_or(0.0);
         // Every level and every kind is as likely as another beforehand.
         let weight = |of: f64| (0.5 * (of - gain)).exp();
         let sum: f64 = gains.iter().flatten().map(|(_, of)| weight(*of)).filter(|weight| *weight > NO_WEIGHT).sum();
@@ -346,7 +342,7 @@ impl Posterior {
             }
         }
         covariance.ger(-1.0, &mean, &mean, 1.0);
-        Ok(Self { mean, covariance, level_m, gain, freedom, likely })
+        Ok(Self { mean, covariance, gain, freedom, likely })
     }
 
     fn sigma_m(&self) -> Vec<f64> {
@@ -361,7 +357,6 @@ impl Posterior {
         (used_up > 0.0).then(|| PrintErrors {
             errors_m: (0..n).map(|i| Vector2::new(self.mean[i], self.mean[n + i])).collect(),
             sigma_m: self.sigma_m(),
-            level_m: self.level_m,
             gain,
             used_up,
             shares: self.likely.clone(),
