@@ -162,9 +162,10 @@ fn a_folder_is_downloaded_by_one_at_a_time_and_for_no_other_site() {
     assert!(served.ask(&get("")).starts_with("HTTP/1.1 503"), "another while the first is under way");
     let grown = served.megabytes() - before;
     assert!(grown < 32.0, "{grown} MB are kept of 64 that nobody takes");
-    let mut rest = Vec::new();
-    first.read_to_end(&mut rest).expect("the whole archive");
-    assert!(rest.len() > 64 << 20, "{} bytes", rest.len());
+    // The first read may hold the start of the archive behind the header.
+    begun.truncate(count);
+    first.read_to_end(&mut begun).expect("the whole archive");
+    assert!(begun.len() > 64 << 20, "{} bytes", begun.len());
     // Its place is free when the last of it was taken.
     let deadline = std::time::Instant::now() + SOON;
     while !served.ask(&get("")).starts_with("HTTP/1.1 200") {
