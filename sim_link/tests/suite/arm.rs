@@ -3,7 +3,7 @@
 use ciborium::Value;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
-use handeye_sim_link::cell::scene::Scene;
+use handeye_sim_link::cell::scene::{JointModeSpec, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{
     Arm, ArmJog, ArmKinematics, CameraFeed, CellClient, CellPaths, JogAxes, JogEnd, JogObstacle,
@@ -31,13 +31,21 @@ struct Bench {
 impl Bench {
     /// A cell whose passes come only when the arm's client steps: the same numbers on every machine.
     fn stepped() -> Self {
-        let mut bench = Self::running();
+        Self::stepped_in(Scene::reference().expect("valid"))
+    }
+
+    fn stepped_in(scene: Scene) -> Self {
+        let mut bench = Self::running_in(scene);
         bench.arm.sim().set_stepping(true).expect("a call");
         bench
     }
 
     fn running() -> Self {
-        let config = CellConfig { real_time: Some(false), ..CellConfig::new(Scene::reference().expect("valid")) };
+        Self::running_in(Scene::reference().expect("valid"))
+    }
+
+    fn running_in(scene: Scene) -> Self {
+        let config = CellConfig { real_time: Some(false), ..CellConfig::new(scene) };
         let server = CellServer::start(config).expect("a free port");
         let mut arm = connect(&server);
         arm.sim().start_simulation().expect("a call");
@@ -224,6 +232,34 @@ fn a_tip_that_is_held_until_it_can_go_no_further_stops_and_says_why() {
     let end = bench.arm.jog(&jog, None, &mut held).expect("calls");
     assert!(matches!(end, JogEnd::Obstacle(JogObstacle::Reach(_) | JogObstacle::Singular { .. })), "{end:?}");
     assert!(fastest_rad_s <= 90.01_f64.to_radians(), "{}°/s", fastest_rad_s.to_degrees());
+}
+
+#[test]
+fn a_joint_whose_controller_is_slower_than_the_motion_is_waited_for_and_not_taken_for_held() {
+    let mut scene = Scene::coppeliasim().expect("valid");
+    scene.robot.joint_mode = JointModeSpec::Dynamic;
+    let mut bench = Bench::stepped_in(scene);
+    let start = bench.joints();
+    let mut goal = start;
+    goal[5] += 4.0;
+    // The controller goes no faster than 90°/s.
+    let fast = MotionLimits::uniform(6, 4.0, 30.0, 300.0);
+    bench.arm.move_to_joints(&goal, &fast, &CancelToken::default()).expect("it is on its way, and arrives");
+
+    // One that is taken away from where it was sent is in another's hands, though its controller takes it back.
+    let mut other = connect(&bench.server);
+    let joint = other.sim().get_object_index("/UR5/joint", 0).expect("a joint");
+    let at = bench.joints()[0];
+    let mut passes = 0;
+    let mut held = || {
+        passes += 1;
+        if passes == 5 {
+            other.sim().set_joint_position(joint, at - 0.6).expect("a call");
+        }
+        (passes < 20).then_some(0.1)
+    };
+    let end = bench.arm.jog(&ArmJog::Joint { index: 0, forward: true }, None, &mut held);
+    assert_eq!(end, Ok(JogEnd::NotFollowing { joint: 1 }));
 }
 
 #[test]

@@ -24,7 +24,8 @@ use crate::client::sim::ObjectHandle;
 /// A joint that is where it is put may be off by rounding \[rad\].
 pub(super) const PLACED_OFF_RAD: f64 = 1e-6;
 
-/// A joint moved by forces lags behind: by a few degrees at full speed, as its controller is tuned \[rad\].
+/// A joint moved by forces lags behind: by a few degrees, as its controller is tuned. One that lags more is given time while it
+/// comes nearer to where it was sent: no simulator says how fast its controllers can be \[rad\].
 const DRIVEN_OFF_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 
 /// Points under way to an arm that nobody else moves.
@@ -32,6 +33,8 @@ pub(super) struct Stream {
     sentinel: Sentinel,
     dynamic: Vec<bool>,
     sent: JointValues,
+    /// Where the joints were in the pass before.
+    seen: JointValues,
     seen_s: Option<f64>,
     /// When simulated time went on for the last time.
     advanced: Instant,
@@ -62,7 +65,7 @@ pub(super) struct Point {
 /// What became of a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Pass {
-    /// None has gone by since the last point.
+    /// None has gone by since the last point, or a slow joint is still on its way to it; nothing was sent.
     None,
     /// A point was sent, and the pass is over.
     Sent,
@@ -82,7 +85,7 @@ impl Stream {
         let dynamic = joints.iter().map(|&joint| arm.sim.is_joint_dynamic(joint)).collect::<Result<_, _>>()?;
         let sentinel = Sentinel::begin(&mut arm.sim, &arm.info)?;
         let advanced = Instant::now();
-        Ok(Self { sentinel, dynamic, sent: start, seen_s: None, advanced, is_stopped: false, task })
+        Ok(Self { sentinel, dynamic, sent: start, seen: start, seen_s: None, advanced, is_stopped: false, task })
     }
 
     /// Tidies up behind the last point, unless the connection is gone or this client a new one for the server.
@@ -157,9 +160,17 @@ impl Stream {
         (self.seen_s, self.advanced) = (Some(now_s), Instant::now());
         let joints = read_joint_values(&mut arm.sim, &arm.objects)?;
         let tolerance = |joint: usize| if self.dynamic[joint] { DRIVEN_OFF_RAD } else { PLACED_OFF_RAD };
-        let off_rad = |joint: usize| difference_rad(arm.kind(joint), joints[joint], self.sent[joint]);
-        if let Some(joint) = (0..joints.len()).find(|&i| off_rad(i) > tolerance(i)) {
+        let off_rad = |at: &JointValues, joint: usize| difference_rad(arm.kind(joint), at[joint], self.sent[joint]);
+        let is_off = |&joint: &usize| off_rad(&joints, joint) > tolerance(joint);
+        let comes_nearer = |joint: usize| self.dynamic[joint] && off_rad(&joints, joint) < off_rad(&self.seen, joint);
+        let elsewhere = (0..joints.len()).filter(is_off).find(|&joint| !comes_nearer(joint));
+        let is_behind = (0..joints.len()).any(|joint| is_off(&joint));
+        self.seen = joints;
+        if let Some(joint) = elsewhere {
             return Ok(Pass::NotFollowing { joint, at: joints[joint] });
+        }
+        if is_behind {
+            return Ok(Pass::None);
         }
         let point = next(&Slot { now_s, since_last_s, is_stopped: self.is_stopped });
         for joint in (0..joints.len()).filter(|&i| point.joints[i] != self.sent[i]) {
