@@ -94,7 +94,9 @@ impl Side {
         // Rows are counted along `main`; the step is looked for along the other axis.
         let main = usize::from(way.y.abs() >= way.x.abs());
         let cross = 1 - main;
-        let bend = self.middle(map)[cross] - 0.5 * (a + b)[cross];
+        // Off the line between the ends: perspective moves the middle along it, which bends nothing.
+        let middle = self.middle(map) - a;
+        let bend = middle[cross] - middle[main] / way[main] * way[cross];
         let reach = (reach.part * length).min(reach.most_px);
         let [from_a, from_b] = [0, 1].map(|i| self.margin(map, i, main, reach));
         let (low, high, from_low, from_high) =

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use image::Luma;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -24,13 +26,18 @@ struct Drawn {
 impl Drawn {
     /// A pose as of hand-eye calibration: 0.3 to 0.55 m away, tilted by up to 45°, rolled by `roll`.
     fn random(random: &mut ChaCha8Rng, roll: f64, print_squares: f64) -> Self {
+        Self::within(random, [0.0..45.0, 0.3..0.55], roll, print_squares)
+    }
+
+    /// Tilted by so many degrees, so many metres away.
+    fn within(random: &mut ChaCha8Rng, [tilt, away]: [Range<f64>; 2], roll: f64, print_squares: f64) -> Self {
         loop {
             let towards: f64 = random.random_range(0.0..std::f64::consts::TAU);
             let axis = Vector3::new(towards.cos(), towards.sin(), 0.0);
-            let tilt = UnitQuaternion::from_scaled_axis(axis * random.random_range(0.0..45f64.to_radians()));
+            let tilt = UnitQuaternion::from_scaled_axis(axis * random.random_range(tilt.clone()).to_radians());
             let turn = tilt * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
             let aside = Vector3::new(random.random_range(-0.1..0.1), random.random_range(-0.08..0.08), 0.0);
-            let at = Translation3::from(aside + Vector3::z() * random.random_range(0.3..0.55));
+            let at = Translation3::from(aside + Vector3::z() * random.random_range(away.clone()));
             let middle = Translation3::new(-4.5 * GRID.square_m, -3.0 * GRID.square_m, 0.0);
             let pose = Isometry3::from_parts(at, turn) * middle;
             let column = |i: usize| pose.rotation.to_rotation_matrix().matrix().column(i).into_owned() * GRID.square_m;
@@ -128,12 +135,29 @@ fn corners_of_hard_edges_are_found_where_they_were_printed_to_what_is_stated() {
         let all: Vec<_> = drawn.iter().map(found).collect();
         let (searched_px, _) = errors(all.iter().map(|[searched, _]| searched));
         let (refined_px, relative) = errors(all.iter().map(|[_, refined]| refined));
+        let worst = all.iter().map(|[_, refined]| errors([refined]).1).fold(0.0, f64::max);
         println!(
-            "print {print_squares}: {searched_px:.4} px, refined {refined_px:.4}, {relative:.3} of what is stated"
+            "print {print_squares}: {searched_px:.4} px, refined {refined_px:.4}, {relative:.3} of what is stated, \
+             {worst:.3} in one image"
         );
         assert!(refined_px < 0.08 && refined_px < 0.8 * searched_px, "{searched_px} {refined_px}");
         // A print as bad as expected would be at 1. A better one is stated with too much, and none with too little.
         assert!((0.4..1.15).contains(&relative), "{relative}");
+    }
+}
+
+/// Perspective moves the middle of a side along it, and that is no bend: counted as one, it put corners off by many times what
+/// is stated, all of a board to one side, and the focal length of a session by 0.012 %.
+#[test]
+fn sides_that_run_obliquely_on_a_tilted_board_are_straight() {
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    for i in 0..8 {
+        let drawn = Drawn::within(&mut random, [40.0..50.0, 0.25..0.3], 0.3 + f64::from(i) * 0.15, 0.0);
+        let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges");
+        let (px, relative) = errors([&(found, drawn.truth())]);
+        println!("{px:.4} px, {relative:.3} of what is stated");
+        // An exact print is better than what is expected of prints.
+        assert!(relative < 1.0, "{px} px, {relative} of what is stated");
     }
 }
 
