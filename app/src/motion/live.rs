@@ -266,7 +266,11 @@ pub fn end_of_following(end: &FollowEnd) -> Text {
         FollowEnd::Released => text!("it was released"),
         FollowEnd::Stopped => text!("The arm was stopped"),
         FollowEnd::Workspace => text!("The goal is outside the box in which the tip may follow"),
-        FollowEnd::JointLimit { joint } => text!("Joint {joint} is at the end of its range", joint = joint),
+        FollowEnd::JointLimit { joint } => text!(
+            "Joint {joint} is at the end of its range. Start again and make room first: the arm then begins from where its \
+             joints have some on both sides",
+            joint = joint
+        ),
         FollowEnd::Singular => {
             text!(
                 "The arm is nearly stretched, close to its column, or two of its axes are in line: it cannot follow there. \

@@ -14,7 +14,7 @@ pub use markdown::markdown;
 pub use page::{of_session, page, shared_camera};
 
 use crate::model::Solved;
-use crate::wording::English;
+use crate::wording::{English, decimals, shown};
 
 /// What is said of one thing. Numbers have their units.
 #[derive(Debug, Clone, Default)]
@@ -62,6 +62,7 @@ pub fn sections(solved: &Solved) -> Vec<Section> {
     all.push(methods(result));
     all.push(views(result));
     all.extend(verification(solved));
+    all.extend(depth_camera(result));
     all.retain(|section| !section.lines.is_empty() || !section.summary.is_empty() || !section.title.is_empty());
     all
 }
@@ -273,6 +274,38 @@ fn views(result: &CalibrationResult) -> Section {
         Line::row(&view.name, [Some(status.to_owned()), rms, influence].into_iter().flatten())
     });
     Section { title: "views".to_owned(), lines: lines.collect(), name_width: 24, ..Section::default() }
+}
+
+/// What the depths of the captures are off.
+fn depth_camera(result: &CalibrationResult) -> Option<Section> {
+    let depth = result.depth?;
+    let title = match depth.captures {
+        1 => "depth camera, by the target in 1 capture".to_owned(),
+        count => format!("depth camera, by the target in {count} captures"),
+    };
+    let filled = format!("{:.1} % of its pixels have a depth", depth.fill * 1e2);
+    let Some(errors) = depth.errors else {
+        let ratio = format!("{} times what is expected", shown(depth.ratio, 3));
+        return Some(Section { title, summary: vec![filled, ratio], ..Section::default() });
+    };
+    // To the decimals of its uncertainty.
+    let with_sigma = |value: f64, sigma: f64, least: usize| {
+        let decimals = decimals(sigma, least);
+        format!("{value:+.decimals$} ± {sigma:.decimals$}")
+    };
+    let offset = with_sigma(errors.offset_mm, errors.offset_sigma_mm, 3);
+    let mut lines = vec![Line::row("offset", [format!("{offset} mm at {:.0} mm", errors.at_mm)])];
+    if let (Some(scale), Some(sigma)) = (errors.scale, errors.scale_sigma) {
+        lines.push(Line::row("scale", [format!("{} %", with_sigma(scale * 1e2, sigma * 1e2, 3))]));
+    }
+    if let (Some(slope), Some(sigma)) = (errors.slope_px, errors.slope_sigma_px) {
+        lines.push(Line::row("slope", [format!("{} px", with_sigma(slope, sigma, 2))]));
+    }
+    let [x, y] = [0, 1].map(|axis| with_sigma(errors.tilt_deg[axis], errors.tilt_sigma_deg[axis], 3));
+    lines.push(Line::row("tilt", [format!("x {x}°, y {y}°")]));
+    let noise = [errors.noise_mm, errors.between_mm].map(|mm| shown(mm, 3));
+    lines.push(Line::row("noise", [format!("{} mm of single depths, {} mm between captures", noise[0], noise[1])]));
+    Some(Section { title, summary: vec![filled], lines, name_width: 8 })
 }
 
 /// How the answer does on captures that never entered the fit; nothing when there are none.

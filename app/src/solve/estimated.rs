@@ -3,6 +3,8 @@
 use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_core::estimate::handeye::joint::PrintErrors;
 use handeye_core::estimate::{Calibration, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_core::verify::{DepthErrors, DepthReport};
+use handeye_core::wording::shown;
 
 use crate::text;
 use crate::text::Text;
@@ -24,10 +26,11 @@ pub struct EstimatedValue {
 }
 
 /// All of it, one line each; nothing is said of what is as usual.
-pub fn estimated(calibration: &Calibration) -> Vec<EstimatedValue> {
+pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
+    lines.extend(depth.and_then(depth_camera));
     let Some(joint) = &calibration.joint else { return lines };
     if let Some(shape) = &joint.shape {
         lines.extend(bend(shape));
@@ -98,6 +101,30 @@ fn print(print: &PrintErrors) -> EstimatedValue {
         ),
         why: None,
     }
+}
+
+fn depth_camera(report: &DepthReport) -> Option<EstimatedValue> {
+    let value = if report.is_gross() {
+        text!("{ratio} times what is expected", ratio = shown(report.ratio, 3))
+    } else {
+        let DepthErrors { offset_m, at_m, noise_m, .. } = report.errors.as_ref()?;
+        text!(
+            "{offset} ± {sigma} mm at {at} mm, noise {noise} mm, {fill} % filled",
+            offset = format!("{:+.2}", offset_m.value * 1e3),
+            sigma = shown(offset_m.sigma * 1e3, 2),
+            at = format!("{:.0}", at_m * 1e3),
+            noise = shown(noise_m * 1e3, 2),
+            fill = format!("{:.0}", report.fill * 1e2)
+        )
+    };
+    Some(EstimatedValue {
+        what: text!("Depth camera"),
+        value,
+        meaning: text!(
+            "Measured depth of the board minus the depth at which the calibration has it, how single depths scatter, and how              many pixels of the board have one; ± is one standard deviation. The answer does not depend on it"
+        ),
+        why: None,
+    })
 }
 
 fn view_noise(joint: &JointFit) -> Option<EstimatedValue> {
@@ -189,7 +216,7 @@ mod tests {
         joint.widening = Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() };
         joint.noise.view_px = 0.0;
         change(&mut calibration);
-        let lines = estimated(&calibration);
+        let lines = estimated(&calibration, None);
         lines.iter().map(|it| (it.what.say(Language::English), it.value.say(Language::English))).collect()
     }
 

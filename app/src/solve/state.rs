@@ -7,7 +7,7 @@ use handeye_core::estimate::Calibration;
 use handeye_core::progress::Stage;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::CaptureId;
-use handeye_core::verify::{Predictor, Verification, VerifyError};
+use handeye_core::verify::{DepthReport, Predictor, Verification, VerifyError};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -33,6 +33,8 @@ pub struct Solved {
     pub calibrated: Option<Predictor>,
     /// How well it does on captures that never entered the fit; `None` while there are none.
     pub verification: Option<Result<Verification, VerifyError>>,
+    /// What the depths of the captures say of a depth camera; `None` where they have none.
+    pub depth: Option<DepthReport>,
     /// The captures of `verification` in its order.
     pub verified_captures: Vec<CaptureId>,
     /// How long it took \[s\].

@@ -7,14 +7,15 @@ use std::sync::Arc;
 
 use handeye_core::depth::DepthImage;
 use handeye_core::diagnose::doctor;
-use handeye_core::diagnose::findings::{Finding, FindingOptions};
+use handeye_core::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options};
+use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options, ViewStatus};
 use handeye_core::progress::{CancelToken, Progress, Work};
-use handeye_core::project::result::{VerificationSummary, solve_options};
+use handeye_core::project::result::{DepthSummary, VerificationSummary, solve_options};
 use handeye_core::project::session::{CaptureId, Document};
+use handeye_core::targets::bent::BoardShape;
 use handeye_core::targets::observation::View;
-use handeye_core::verify::{self, CheckCapture, Predictor, Verification, VerifyError};
+use handeye_core::verify::{self, CheckCapture, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
 
 use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
@@ -24,6 +25,9 @@ use crate::worker::link::Outlet;
 
 /// Progress is told when it has come so much further: a window that is drawn for every step would slow the solve down.
 const PROGRESS_STEP: f64 = 0.05;
+
+/// Where nothing reflects a sensor reports its far plane, which no board is at, so that it need not be known.
+const FAR_M: f32 = f32::INFINITY;
 
 /// A set of captures to calibrate.
 pub struct SolveJob {
@@ -90,22 +94,25 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
 /// When the work was cancelled.
 pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
-    let findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
+    let mut findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
     let options = solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
+    let depth = depth_camera(job, &calibration, work)?;
+    findings.extend(depth.as_ref().and_then(|depth| depth_finding(depth, calibration.tip_error_95_m())));
+    sort(&mut findings);
+    result.depth = depth.as_ref().map(DepthSummary::from);
     result.findings = findings.iter().map(Finding::to_record).collect();
     let calibrated = Predictor::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
-        let depths: Vec<Option<DepthImage>> = job.verification.iter().map(|(id, _)| depth(job, *id)).collect();
+        let depths: Vec<Option<DepthImage>> = job.verification.iter().map(|(id, _)| recorded_depth(job, *id)).collect();
         let captures: Vec<CheckCapture<'_>> = job
             .verification
             .iter()
             .zip(&depths)
-            // Where nothing reflects a sensor reports its far plane, which no corner of a board is at.
-            .map(|((_, view), depth)| CheckCapture { view, depth: depth.as_ref(), far_m: f32::INFINITY })
+            .map(|((_, view), depth)| CheckCapture { view, depth: depth.as_ref(), far_m: FAR_M })
             .collect();
         verify::verify(calibrated, &job.observations.target, &captures, work)
     });
@@ -120,18 +127,42 @@ pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) ->
         findings,
         calibrated,
         verification,
+        depth,
         verified_captures: job.verification.iter().map(|(id, _)| *id).collect(),
         calibration,
         took_s: 0.0,
     })
 }
 
+/// What the depths of the captures in the fit say of a depth camera.
+fn depth_camera(
+    job: &SolveJob,
+    calibration: &Calibration,
+    work: Work<'_>,
+) -> Result<Option<DepthReport>, CalibrateError> {
+    let Some(lens) = calibration.intrinsics() else { return Ok(None) };
+    let shape =
+        calibration.joint.as_ref().and_then(|joint| joint.shape).map_or_else(BoardShape::default, |it| it.shape);
+    let mut check = DepthCheck::new(&lens, &job.observations.target, &shape);
+    for (view, id) in calibration.views.iter().zip(&job.captures) {
+        if work.is_cancelled() {
+            return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
+        }
+        let used = view.camera_from_target.filter(|_| view.status == ViewStatus::Used);
+        if let Some((board, depth)) = used.and_then(|board| Some((board, recorded_depth(job, *id)?))) {
+            check.add(&depth, FAR_M, board.isometry());
+        }
+    }
+    let sigma_px = calibration.camera.and_then(|camera| camera.sigma_px);
+    Ok(check.finish(sigma_px.map_or(0.0, |sigma| sigma[0])))
+}
+
 /// The depth that was measured in a capture. One that cannot be read is as none: the answer does not depend on it.
-fn depth(job: &SolveJob, id: CaptureId) -> Option<DepthImage> {
+fn recorded_depth(job: &SolveJob, id: CaptureId) -> Option<DepthImage> {
     let (folder, document) = job.recorded.as_ref()?;
     let depth = document.capture(id)?.load_depth_m(folder);
     depth.unwrap_or_else(|error| {
-        tracing::warn!(%error, "the depth of a capture for verification cannot be read");
+        tracing::warn!(%error, "the depth of a capture cannot be read");
         None
     })
 }
@@ -148,12 +179,67 @@ fn summary(verification: &Verification) -> VerificationSummary {
 
 #[cfg(test)]
 mod tests {
+    use handeye_core::diagnose::findings::FindingCode;
     use handeye_core::image::RgbImage;
+    use handeye_core::project::result::CalibrationResult;
     use handeye_core::project::session::{Capture, Role, Session, Store};
 
     use super::*;
     use crate::gui::testing::sample;
     use crate::session::start;
+
+    /// A depth camera that puts everything 2 mm and a part in a hundred too far away.
+    #[test]
+    fn what_the_depths_of_the_captures_are_off_is_in_the_result_and_said() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut store =
+            Store::create(folder.path(), start::meta(None, "2026-05-02T10:11:12Z".to_owned())).expect("a session");
+        let model = sample::solved();
+        let solved = model.solve.solved.as_ref().expect("solved");
+        let lens = solved.calibration.intrinsics().expect("a lens");
+        for (view, id) in solved.calibration.views.iter().zip(&solved.captures) {
+            let board = view.camera_from_target.expect("fitted");
+            let normal = board.isometry().rotation * nalgebra::Vector3::z();
+            let metres = (0..640 * 480).map(|i| {
+                let px = nalgebra::Vector2::new(f64::from(i % 640), f64::from(i / 640));
+                let ray = lens.unproject(&px).map_or(f64::NAN, |ray| normal.dot(&ray) / ray.z);
+                (normal.dot(&board.translation()) / ray * 1.01 + 0.002) as f32
+            });
+            let depth = DepthImage::new(640, 480, metres.collect()).expect("as many as pixels");
+            let record = model.document().capture(*id).expect("a capture");
+            let image = RgbImage::new(640, 480);
+            store
+                .add_capture(&Capture { depth_m: Some(&depth), ..Capture::new(&image, record.base_from_tip) })
+                .expect("written");
+        }
+        drop(store);
+        let document = Session::open(folder.path()).expect("a session").document;
+        let captures = document.captures.iter().map(|capture| capture.id).collect();
+        let job = SolveJob {
+            id: JobId(1),
+            observations: sample::observations(),
+            captures,
+            verification: Vec::new(),
+            recorded: Some((folder.path().to_path_buf(), document)),
+            method: Method::Joint,
+            options: Options::default(),
+            goal_m: 5e-4,
+            truth: None,
+        };
+        let cancel = CancelToken::default();
+        let solved = examined(&job, solved.calibration.clone(), (&cancel).into()).expect("not cancelled");
+        let errors = solved.result.depth.and_then(|depth| depth.errors).expect("depths");
+        let expected_mm = 2.0 + 0.01 * errors.at_mm;
+        assert!((errors.offset_mm - expected_mm).abs() < 0.1, "{errors:?}");
+        assert!((errors.scale.expect("captures") - 0.01).abs() < 1e-3, "{errors:?}");
+        let said = solved.findings.iter().find(|finding| finding.code == FindingCode::DepthError).expect("a finding");
+        assert!(said.to_string().contains("growing by +1.00"), "{said}");
+        let json = solved.result.to_json().expect("a result");
+        assert_eq!(CalibrationResult::from_json(&json).expect("readable").depth, solved.result.depth);
+        cancel.cancel();
+        let calibration = solved.calibration.clone();
+        assert!(examined(&job, calibration, (&cancel).into()).is_err(), "it can be cancelled");
+    }
 
     /// A depth camera beside the lens: what it measured at the board stands beside what the calibration predicts.
     #[test]

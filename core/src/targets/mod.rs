@@ -152,6 +152,17 @@ impl TargetSpec {
         Point3::new(half.x, half.y, 0.0)
     }
 
+    /// Places all over the extent of its points, in its plane, on a lattice of cells of even size.
+    pub(crate) fn places_all_over(&self) -> Vec<Point3<f64>> {
+        const ALONG: [usize; 2] = [48, 32];
+        let extent = self.extent();
+        let [columns, rows] = if extent.x >= extent.y { ALONG } else { [ALONG[1], ALONG[0]] };
+        let at = |length: f64, i: usize, n: usize| length * (i as f64 + 0.5) / n as f64;
+        let place =
+            |row: usize, column: usize| Point3::new(at(extent.x, column, columns), at(extent.y, row, rows), 0.0);
+        (0..rows).flat_map(|row| (0..columns).map(move |column| place(row, column))).collect()
+    }
+
     /// Whether the printed pattern looks the same after a turn, so that no detector can tell its ends apart.
     pub fn is_symmetric(&self) -> bool {
         !self.quarter_turns().is_empty()

@@ -1,28 +1,19 @@
 //! The board from depths: every corner becomes a point by its own depth, and a rigid board is laid through the points.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::pose;
 use super::{BoardDetection, ByDepth, Image};
-use crate::depth::{DepthImage, DepthSample};
+use crate::depth::{DepthImage, outlier_reach_m};
 use crate::geometry::frames::{Base, Camera, PointIn, Pose};
 use crate::geometry::se3;
-use crate::geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median_high};
+use crate::geometry::statistics::median_high;
 use crate::targets::TargetSpec;
 use crate::targets::observation::Corner;
 use crate::verify::Predictor;
 
 /// Points that fix a board with one to spare, so that a wrong one shows.
 const MIN_POINTS: usize = 4;
-/// Measurements around a corner that make a median where not all four around it are there.
-const MIN_AROUND: usize = 3;
-/// Depths around a corner that differ by more than this part are those of two surfaces: a board seen at 80° from its
-/// normal, with a pixel of 1/500, has 1 %.
-const ONE_SURFACE: f64 = 0.02;
-/// Points off by more than this many standard deviations (from the median) are not on the board.
-const OUTLIER: f64 = 4.0;
-/// Depths are never called outliers below this [m]: a depth camera's steps.
-const FLOOR_M: f64 = 1e-3;
 const ROUNDS: usize = 4;
 
 /// A corner with depth.
@@ -53,7 +44,7 @@ pub(super) fn by_depth(
         points.iter().map(|p| p.in_camera.z - (seen.camera_from_target.isometry() * p.on_board).z).collect();
     let middle = median_high(ahead.iter().copied())?;
     let off: Vec<f64> = ahead.iter().map(|a| (a - middle).abs()).collect();
-    let reach = reach(&off);
+    let reach = outlier_reach_m(&off);
     let mut off = off.into_iter();
     points.retain(|_| off.next().is_some_and(|off| off <= reach));
     let camera_from_target = fit(&mut points, target)?;
@@ -73,44 +64,9 @@ fn in_base(base_from_camera: &Pose<Base, Camera>, point: Point3<f64>) -> Point3<
 
 /// Where the ray through the corner has the corner's depth.
 fn point_at(depth: &DepthImage, corner: &Corner, far_m: f32, calibrated: &Predictor) -> Option<Point3<f64>> {
-    let depth_m = depth_at(depth, corner.px, far_m)?;
+    let depth_m = depth.at(corner.px, far_m)?;
     let ray = calibrated.intrinsics.unproject(&corner.px).ok()?;
     (ray.z > 0.0).then(|| Point3::from(ray.into_inner() * (depth_m / ray.z)))
-}
-
-/// Between four pixels of one surface by their inverse depths, which are linear over a plane; next to a pixel without
-/// measurement, or at an edge, the median of the pixels around.
-pub(super) fn depth_at(depth: &DepthImage, px: Vector2<f64>, far_m: f32) -> Option<f64> {
-    let measured = |column: f64, row: f64| {
-        if column < 0.0 || row < 0.0 {
-            return None;
-        }
-        match depth.sample(column as u32, row as u32, far_m) {
-            // A far plane of its own keeps infinity out where the sensor states none.
-            DepthSample::Metres(m) if m.is_finite() => Some(f64::from(m)),
-            _ => None,
-        }
-    };
-    let (u, v) = (px.x.floor(), px.y.floor());
-    let four = [measured(u, v), measured(u + 1.0, v), measured(u, v + 1.0), measured(u + 1.0, v + 1.0)];
-    if let [Some(a), Some(b), Some(c), Some(d)] = four {
-        let (low, high) = (a.min(b).min(c).min(d), a.max(b).max(c).max(d));
-        if high - low <= ONE_SURFACE * low {
-            let (s, t) = (px.x - u, px.y - v);
-            let inverse = (1.0 - t) * ((1.0 - s) / a + s / b) + t * ((1.0 - s) / c + s / d);
-            return Some(1.0 / inverse);
-        }
-    }
-    let (u, v) = (px.x.round(), px.y.round());
-    let mut around = Vec::with_capacity(9);
-    for (du, dv) in [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)] {
-        around.extend(measured(u + f64::from(du), v + f64::from(dv)));
-    }
-    if around.len() < MIN_AROUND { None } else { median_high(around) }
-}
-
-pub(super) fn reach(off: &[f64]) -> f64 {
-    (OUTLIER * SIGMA_PER_MEDIAN_SIZE * median_high(off.iter().copied()).unwrap_or(0.0)).max(FLOOR_M)
 }
 
 /// Rigid fit; points that do not fit are taken out of the set.
@@ -124,7 +80,7 @@ fn fit(points: &mut Vec<Point>, target: &TargetSpec) -> Option<Isometry3<f64>> {
         let found = rigid(points);
         pose = Some(found);
         let off: Vec<f64> = points.iter().map(|p| (found * p.on_board - p.in_camera).norm()).collect();
-        let reach = reach(&off);
+        let reach = outlier_reach_m(&off);
         if off.iter().all(|off| *off <= reach) {
             break;
         }

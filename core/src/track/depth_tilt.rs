@@ -11,15 +11,12 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix2x6, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
-use super::by_depth::{depth_at, reach};
-use crate::depth::DepthImage;
+use crate::depth::{DepthImage, outlier_reach_m};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::se3;
 use crate::geometry::statistics::median_high;
 use crate::targets::TargetSpec;
 
-/// Places on the board whose depth is taken, along its longer and its shorter side.
-const ALONG: (usize, usize) = (48, 32);
 /// Least part of the places that have a depth of the board's plane: with fewer a thing before the board may be taken for it.
 const LEAST: f64 = 0.3;
 const ROUNDS: usize = 4;
@@ -55,12 +52,12 @@ impl DepthTilt {
         target: &TargetSpec,
         camera_from_target: &Isometry3<f64>,
     ) -> Option<Self> {
-        let places = places(target);
+        let places = target.places_all_over();
         let mut samples: Vec<Sample> = Vec::with_capacity(places.len());
         for place in &places {
-            let point = camera_from_target * nalgebra::Point3::new(place.x, place.y, 0.0);
+            let point = camera_from_target * place;
             let Ok(px) = camera.project(&point) else { continue };
-            let Some(depth_m) = depth_at(depth, px, far_m) else { continue };
+            let Some(depth_m) = depth.at(px, far_m) else { continue };
             let ray = Vector3::new(point.x / point.z, point.y / point.z, 1.0);
             samples.push(Sample { ray, inverse: 1.0 / depth_m, depth_m, off_m: depth_m - point.z });
         }
@@ -150,21 +147,8 @@ impl Plane {
 
 fn keep_near(samples: &mut Vec<Sample>) {
     let off: Vec<f64> = samples.iter().map(|sample| sample.off_m.abs()).collect();
-    let reach = reach(&off);
+    let reach = outlier_reach_m(&off);
     samples.retain(|sample| sample.off_m.abs() <= reach);
-}
-
-/// Places all over the points of a target, in its plane.
-fn places(target: &TargetSpec) -> Vec<Vector2<f64>> {
-    let points = target.points();
-    let range = |axis: usize| {
-        let values = points.iter().map(move |point| point[axis]);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
-    };
-    let (x, y) = (range(0), range(1));
-    let (columns, rows) = if x.1 - x.0 >= y.1 - y.0 { ALONG } else { (ALONG.1, ALONG.0) };
-    let at = |(low, high): (f64, f64), i: usize, n: usize| low + (high - low) * (i as f64 + 0.5) / n as f64;
-    (0..rows).flat_map(|row| (0..columns).map(move |c| Vector2::new(at(x, c, columns), at(y, row, rows)))).collect()
 }
 
 /// The slopes of the inverse depth of the board at a pose, and how they turn with it (right perturbation).

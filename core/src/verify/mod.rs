@@ -7,6 +7,7 @@
 
 mod calibrated;
 mod consistency;
+mod depth_camera;
 mod points;
 
 use nalgebra::{Point3, Translation3, Vector3};
@@ -25,6 +26,7 @@ use crate::targets::observation::{Corner, View};
 
 pub use calibrated::{Predictor, Uncertainty};
 pub use consistency::Consistency;
+pub use depth_camera::{DepthCheck, DepthErrors, DepthReport, Estimated};
 pub use points::MeasuredPoint;
 
 /// Why there is nothing to verify with.

@@ -180,12 +180,14 @@ impl Live {
         if cancel.is_cancelled() || job.frames.is_some_and(|frames| taken.summary.frames >= frames) {
             return Ok(());
         }
+        let has_no_room = matches!(end, FollowEnd::JointLimit { .. } | FollowEnd::Singular);
+        let hint = if has_no_room { " (--make-room)" } else { "" };
         let why = match end {
             FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(&FollowEnd::Released)),
             end => end_of_following(&end),
         };
         let why = why.say(Language::English);
-        let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}"));
+        let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}{hint}"));
         taken.summary.follow_ended = Some(why);
         Err(error)
     }

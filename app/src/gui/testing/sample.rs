@@ -244,6 +244,7 @@ pub fn solved() -> Model {
         result,
         calibrated: Some(calibrated),
         verification: Some(verification),
+        depth: None,
         verified_captures: (FITTED + 1..=FITTED + VERIFYING).map(CaptureId).collect(),
         calibration,
         took_s: 0.2,

@@ -92,6 +92,8 @@ pub enum FindingCode {
     PrintErrors,
     /// The lens does more than its model.
     ResidualDistortion,
+    /// Depths of the target are not those of where it is.
+    DepthError,
     /// The closed forms do not agree.
     ClosedFormsDisagree,
     /// The expected error is below the goal.

@@ -7,12 +7,14 @@
 //! Before a calibration only the views themselves are judged; with one, also the answer.
 
 mod answer;
+mod depth;
 mod direction;
 mod finding;
 pub(crate) mod outliers;
 mod shared_lens;
 mod views;
 
+pub use depth::finding as depth_finding;
 pub(crate) use finding::listed;
 pub use finding::{Finding, FindingCode, Severity};
 pub use outliers::WIDENING_WORTH_SAYING;
@@ -67,7 +69,7 @@ pub fn findings(
 }
 
 /// The most severe first, in the order of the codes within a severity.
-pub(crate) fn sort(found: &mut [Finding]) {
+pub fn sort(found: &mut [Finding]) {
     found.sort_by(|a, b| b.severity.cmp(&a.severity).then(a.code.cmp(&b.code)));
 }
 

@@ -95,6 +95,22 @@ impl CalibrationResult {
             numbers.push(("verification.centre_rms_mm", Some(verification.centre_rms_mm)));
             numbers.push(("verification.orientation_rms_deg", Some(verification.orientation_rms_deg)));
         }
+        if let Some(depth) = &self.depth {
+            numbers.push(("depth.fill", Some(depth.fill)));
+            numbers.push(("depth.ratio", Some(depth.ratio)));
+            if let Some(errors) = &depth.errors {
+                numbers.push(("depth.errors.offset_sigma_mm", Some(errors.offset_sigma_mm)));
+                numbers.push(("depth.errors.at_mm", Some(errors.at_mm)));
+                numbers.push(("depth.errors.scale_sigma", errors.scale_sigma));
+                numbers.push(("depth.errors.slope_sigma_px", errors.slope_sigma_px));
+                numbers.push(("depth.errors.noise_mm", Some(errors.noise_mm)));
+                numbers.push(("depth.errors.between_mm", Some(errors.between_mm)));
+                all_finite(&errors.tilt_deg, "depth.errors.tilt_deg")?;
+                all_finite(&errors.tilt_sigma_deg, "depth.errors.tilt_sigma_deg")?;
+                let others = [Some(errors.offset_mm), errors.scale, errors.slope_px];
+                all_finite(&others.map(|value| value.unwrap_or(0.0)), "depth.errors")?;
+            }
+        }
         if let Some(truth) = &self.truth {
             numbers.push(("truth.translation_error_mm", truth.translation_error_mm));
             numbers.push(("truth.rotation_error_deg", truth.rotation_error_deg));

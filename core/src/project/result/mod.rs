@@ -19,6 +19,7 @@ use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Camera, Frame, Mount, Pose};
 use crate::plan::guided::record::GuidedRecord;
+use crate::verify::DepthReport;
 
 pub use check::BadResult;
 pub use estimate::{
@@ -63,6 +64,9 @@ pub struct CalibrationResult {
     /// Errors on captures that never entered the fit; `None` when there are none.
     #[serde(default)]
     pub verification: Option<VerificationSummary>,
+    /// What the depths of the captures say of a depth camera; `None` where the captures have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthSummary>,
     /// How its poses were chosen, where guided capture chose them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub guided: Option<GuidedRecord>,
@@ -328,6 +332,66 @@ pub struct VerificationSummary {
     pub as_stated: Option<bool>,
 }
 
+/// A depth camera against the calibrated lens: depths of the target in the captures of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DepthSummary {
+    /// Captures with the target in their depths.
+    pub captures: usize,
+    /// Part of the pixels of the target that have a depth.
+    pub fill: f64,
+    /// Measured over expected depth, median.
+    pub ratio: f64,
+    /// How far they are off; `None` for a single capture, and for depths of another unit or another image.
+    pub errors: Option<DepthErrorsSummary>,
+}
+
+/// How far depths are off; standard deviations are of one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DepthErrorsSummary {
+    /// Measured minus expected depth at a distance of [`Self::at_mm`], millimetres.
+    pub offset_mm: f64,
+    /// Its standard deviation.
+    pub offset_sigma_mm: f64,
+    /// Mean distance of the target, millimetres.
+    pub at_mm: f64,
+    /// How much faster than the distance the depth grows; `None` for less than six captures.
+    pub scale: Option<f64>,
+    /// Its standard deviation.
+    pub scale_sigma: Option<f64>,
+    /// What is added to the depth of a slanted surface, in pixels' worth of its slope; `None` for less than six captures.
+    pub slope_px: Option<f64>,
+    /// Its standard deviation.
+    pub slope_sigma_px: Option<f64>,
+    /// How far the target is turned by depth, about the camera's x and y, degrees.
+    pub tilt_deg: [f64; 2],
+    /// Standard deviations of both.
+    pub tilt_sigma_deg: [f64; 2],
+    /// Scatter of single depths about the plane of a capture, millimetres.
+    pub noise_mm: f64,
+    /// Scatter of the captures about offset, scale and slope, millimetres.
+    pub between_mm: f64,
+}
+
+impl From<&DepthReport> for DepthSummary {
+    fn from(report: &DepthReport) -> Self {
+        let DepthReport { captures, fill, ratio, ref errors } = *report;
+        let errors = errors.as_ref().map(|errors| DepthErrorsSummary {
+            offset_mm: errors.offset_m.value * 1e3,
+            offset_sigma_mm: errors.offset_m.sigma * 1e3,
+            at_mm: errors.at_m * 1e3,
+            scale: errors.scale.map(|scale| scale.value),
+            scale_sigma: errors.scale.map(|scale| scale.sigma),
+            slope_px: errors.slope_px.map(|slope| slope.value),
+            slope_sigma_px: errors.slope_px.map(|slope| slope.sigma),
+            tilt_deg: errors.tilt_rad.map(|tilt| tilt.value.to_degrees()),
+            tilt_sigma_deg: errors.tilt_rad.map(|tilt| tilt.sigma.to_degrees()),
+            noise_mm: errors.noise_m * 1e3,
+            between_mm: errors.between_m * 1e3,
+        });
+        Self { captures, fill, ratio, errors }
+    }
+}
+
 /// How far the result is from the truth of a simulated cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct TruthComparison {
@@ -366,6 +430,7 @@ impl Default for CalibrationResult {
             estimate: None,
             findings: Vec::new(),
             verification: None,
+            depth: None,
             guided: None,
             truth: None,
             provenance: Provenance::default(),

@@ -56,6 +56,12 @@ fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_f
         .filter_map(|finding| finding["code"].as_str())
         .collect();
     assert!(codes.contains(&"print_errors") && !codes.contains(&"board_bent"), "{codes:?}");
+    // The renderer adds a part of what the depth changes by from pixel to pixel, and nothing else.
+    let depth = &result["depth"]["errors"];
+    let (slope_px, sigma_px) = (number(&depth["slope_px"]), number(&depth["slope_sigma_px"]));
+    println!("depth of slopes {slope_px:.3} ± {sigma_px:.3} px");
+    assert!((slope_px - 0.475).abs() < 4.0 * sigma_px && sigma_px < 0.15, "{depth}");
+    assert!(!codes.contains(&"depth_error"), "{codes:?}");
 
     let cell = CellProcess::start(&["--scene", &scene]);
     let endpoint = format!("tcp://127.0.0.1:{}", cell.port());
