@@ -146,6 +146,34 @@ fn corners_of_hard_edges_are_found_where_they_were_printed_to_what_is_stated() {
     }
 }
 
+/// A finger of a gripper over the outline of the print, at a slope of its own to the last sides.
+#[test]
+fn an_edge_of_what_hides_the_outline_is_not_taken_for_the_end_of_a_side() {
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let mut worst_px = 0.0_f64;
+    for i in 0..6 {
+        let drawn = Drawn::within(&mut random, [5.0..25.0, 0.3..0.35], 0.2 + f64::from(i) * 0.07, 0.0);
+        let mut image = drawn.image(1);
+        // Along the line from beside the corner of the print to the middle of the first outer square.
+        let at = |c: f64, r: f64| mapped(&drawn.map, Vector2::new(c, r));
+        let (from, to) = (at(8.72, -1.2), at(9.05, -0.25));
+        let normal = Vector2::new(-(to - from).y, (to - from).x).normalize();
+        for (x, y, pixel) in image.enumerate_pixels_mut() {
+            let off = Vector2::new(f64::from(x), f64::from(y)) - from;
+            if normal.dot(&off) < 0.0 && (to - from).dot(&off) < (to - from).norm_squared() && normal.dot(&off) > -25.0
+            {
+                *pixel = Luma([15]);
+            }
+        }
+        let Some(found) = refine(&image, &drawn.found(&mut random)) else { continue };
+        for (px, truth) in found.points.iter().zip(drawn.truth()) {
+            worst_px = worst_px.max((px - truth).norm());
+        }
+    }
+    println!("{worst_px:.3} px");
+    assert!(worst_px < 0.25, "{worst_px} px");
+}
+
 /// Perspective moves the middle of a side along it, and that is no bend: counted as one, it put corners off by many times what
 /// is stated, all of a board to one side, and the focal length of a session by 0.012 %.
 #[test]

@@ -15,6 +15,10 @@ use super::side::Edge;
 /// Part of the way that a message goes in a round: all change at once.
 const DAMPING: f64 = 0.7;
 
+/// Squared distance, in standard deviations of both, from which what a side says contradicts all others: no corner may be so
+/// far within the polygon of its side, so this is another edge, of what hides the end of the side or of its shadow.
+const CONTRADICTS: f64 = 25.0;
+
 /// Displacements of all corners, pixels.
 pub(super) struct Displacements {
     pub moved: Vec<Vector2<f64>>,
@@ -51,6 +55,10 @@ pub(super) fn displacements<'a>(
     let expected = (DMatrix::identity(numbers, numbers) - smooth * smooth.transpose()) * weight;
     let mut messages: Vec<Message<'_>> = edges.filter_map(|(ends, edge)| Message::first(ends, edge)).collect();
     let mut all = Gaussian::of(&expected, &messages)?;
+    while let Some(worst) = worst(&messages, &all) {
+        messages.swap_remove(worst);
+        all = Gaussian::of(&expected, &messages)?;
+    }
     for _ in 0..rounds {
         for message in &mut messages {
             message.hear(&all);
@@ -65,6 +73,13 @@ pub(super) fn displacements<'a>(
     covariances_px2.iter().all(is_sound).then_some(Displacements { moved, covariances_px2 })
 }
 
+/// The message that contradicts all others most, if one does.
+fn worst(messages: &[Message<'_>], all: &Gaussian) -> Option<usize> {
+    let off = messages.iter().map(|message| message.contradiction(all).unwrap_or(0.0));
+    let (worst, off) = off.enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (off > CONTRADICTS).then_some(worst)
+}
+
 impl<'a> Message<'a> {
     /// By the polygon alone.
     fn first(ends: [Option<usize>; 2], edge: &'a Edge) -> Option<Self> {
@@ -76,6 +91,32 @@ impl<'a> Message<'a> {
             [None, None] => return None,
         };
         Some(Self { ends, edge, precision, weighted: precision * mean })
+    }
+
+    /// Squared distance of what it says from what all others say, in standard deviations of the difference.
+    fn contradiction(&self, all: &Gaussian) -> Option<f64> {
+        let along = |corners: [usize; 2]| all.along(corners, &self.edge.normal);
+        let both = |of_all: &Moments| {
+            let others = of_all.covariance.try_inverse()? - self.precision;
+            let covariance = others.try_inverse()?;
+            let mean = covariance * (of_all.covariance.try_inverse()? * of_all.mean - self.weighted);
+            let off = mean - self.edge.moments.mean;
+            Some(off.dot(&((covariance + self.edge.moments.covariance).try_inverse()? * off)))
+        };
+        let one = |end: usize, corner: usize| {
+            let of_all = along([corner, corner]);
+            let (precision, said) = (1.0 / of_all.covariance.m11, self.precision[(end, end)]);
+            let variance = 1.0 / (precision - said);
+            let mean = variance * (precision * of_all.mean.x - self.weighted[end]);
+            let off = mean - self.edge.moments.mean[end];
+            Some(off * off / (variance + 1.0 / said))
+        };
+        match self.ends {
+            [Some(a), Some(b)] => both(&along([a, b])),
+            [Some(a), None] => one(0, a),
+            [None, Some(b)] => one(1, b),
+            [None, None] => None,
+        }
     }
 
     /// By the polygon and what all others say of both ends. It stays as it is where they contradict it.
