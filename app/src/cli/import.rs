@@ -186,6 +186,7 @@ fn import(
             ImportError::NoPoses { .. } | ImportError::NoViews { .. } | ImportError::DidNotMove { .. },
         ) => Failure::failed(error),
         NotUnderstood::Import(error) => Failure::unusable(error),
+        NotUnderstood::Target(_) if given.is_some() => Failure::failed(anyhow!("nothing was written: {error}")),
         NotUnderstood::Target(_) => Failure::failed(anyhow!("nothing was written: {error}; --target gives it")),
         NotUnderstood::Observe(error) => Failure::failed(error),
     };

@@ -214,7 +214,11 @@ fn list(folder: PathBuf) -> FolderListing {
         entries.sort_by(|a, b| (a.kind, &a.name).cmp(&(b.kind, &b.name)));
         Ok(entries)
     };
-    let entries = read().map_err(|error| error.to_string());
+    let entries = match read() {
+        // The folder of sessions is made with the first of them.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        read => read.map_err(|error| error.to_string()),
+    };
     FolderListing { folder, entries }
 }
 
@@ -265,6 +269,15 @@ mod tests {
             other => panic!("{other:?}"),
         });
         notices.collect()
+    }
+
+    #[test]
+    fn a_folder_of_sessions_that_is_not_there_yet_is_empty_and_one_that_cannot_be_read_says_so() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert_eq!(list(folder.path().join("handeye")).entries, Ok(Vec::new()));
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").expect("written");
+        assert!(list(file).entries.is_err());
     }
 
     #[test]
