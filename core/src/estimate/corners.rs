@@ -326,6 +326,7 @@ fn take_joint(
         free: solution.free,
         covariance: solution.covariance.clone(),
         noise: solution.noise,
+        weights: refined.weights,
         small_sample: solution.small_sample,
         widening: judged.widening,
         reference_point: solution.reference_point,

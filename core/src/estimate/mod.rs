@@ -25,7 +25,9 @@ use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
 use crate::estimate::claim::{Alternative, Claim};
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
-use crate::estimate::handeye::joint::{Free, Noise, PrintErrors, RobotField, ShownDistortion, SmallSample};
+use crate::estimate::handeye::joint::{
+    CornerWeights, Free, Noise, PrintErrors, RobotField, ShownDistortion, SmallSample,
+};
 use crate::estimate::handeye::one_axis::PartialHandEye;
 use crate::estimate::handeye::screening::Distance;
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
@@ -446,6 +448,9 @@ pub struct JointFit {
     pub covariance: DMatrix<f64>,
     /// Noise levels.
     pub noise: Noise,
+    /// How corners count against each other: [`Noise::corner_px`] is of one whose detector states what is usual. `None` where all
+    /// are alike.
+    pub weights: Option<CornerWeights>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
     pub small_sample: SmallSample,
     /// Whether the covariances are true to the data, and by how much they were widened.

@@ -1,16 +1,17 @@
 //! What of a calibration is needed to predict what the camera sees.
 
-use nalgebra::{DMatrix, Matrix6, Vector2};
+use nalgebra::{DMatrix, Matrix2, Matrix6, Vector2};
 
 use super::VerifyError;
 use crate::estimate::Calibration;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{
-    Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
+    CornerWeights, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
 };
 use crate::estimate::uncertainty::quality;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::geometry::view_equations::ViewInput;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};
@@ -44,6 +45,8 @@ pub struct Predictor {
 pub struct Uncertainty {
     /// Noise levels of robot and corners.
     pub noise: Noise,
+    /// How corners count against each other, see [`JointFit::weights`](crate::estimate::JointFit::weights).
+    pub weights: Option<CornerWeights>,
     /// What was estimated besides the links.
     pub free: Free,
     /// Covariance of everything that predictions share, as in
@@ -62,6 +65,7 @@ impl Predictor {
         let joint = calibration.joint.as_ref();
         let uncertainty = joint.map(|joint| Uncertainty {
             noise: joint.noise,
+            weights: joint.weights,
             free: joint.free,
             covariance: joint.covariance.clone(),
         });
@@ -121,6 +125,12 @@ impl Predictor {
         )
     }
 
+    /// How the corners of an image count, see [`ViewInput::sqrt_weights`].
+    pub(super) fn sqrt_weights(&self, corners: &[Corner]) -> Vec<Matrix2<f64>> {
+        let weights = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.weights);
+        weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(corners))
+    }
+
     /// The board's pose in one image, by its corners and the shape that the calibration found, from its pose as a flat
     /// board of the stated size. That a board is 2 % larger than stated puts it 2 % farther away.
     ///
@@ -136,6 +146,9 @@ impl Predictor {
         }
         let mut start = *flat.isometry();
         start.translation.vector *= self.shape.scale;
-        quality::pose_of_view(&self.intrinsics, board, &self.shape, corners, &Pose::from_isometry(start))
+        let sqrt_weights = self.sqrt_weights(corners);
+        let (intrinsics, shape) = (&self.intrinsics, &self.shape);
+        let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights: &sqrt_weights };
+        quality::pose_of_view(&seen, &start)
     }
 }

@@ -106,12 +106,13 @@ impl Sums {
             &calibrated.hand_eye.anchor_from_target(),
         );
         let seen = check.seen_camera_from_target.isometry();
+        let sqrt_weights = calibrated.sqrt_weights(&view.corners);
         let seen_through = ViewInput {
             intrinsics: &calibrated.intrinsics,
             board,
             shape: &calibrated.shape,
             corners: &view.corners,
-            sqrt_weights: &[],
+            sqrt_weights: &sqrt_weights,
         };
         let equations = PoseEquations::new(&seen_through, seen, self.form).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();

@@ -15,9 +15,10 @@
 //! captures is what the uncertainty is from, by ordinary least squares. A focal length that is off puts the board off by the same
 //! part; its uncertainty is added. A target of another size than stated does the same, and nothing here knows.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Translation3, Vector3};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
+use super::points;
 use crate::depth::{DepthImage, DepthSample, outlier_reach_m};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::statistics::median_high;
@@ -136,20 +137,20 @@ impl<'a> DepthCheck<'a> {
         if (depth.width, depth.height) != (lens.width, lens.height) {
             return;
         }
-        let (mut in_image, mut measured) = (0usize, 0usize);
-        let (mut samples, mut ratios) = (Vec::new(), Vec::new());
+        let (mut in_image, mut samples, mut ratios) = (0usize, Vec::new(), Vec::new());
         for place in &self.places {
-            let expected = camera_from_target * place;
-            let Ok(px) = lens.project(&expected) else { continue };
+            let Ok(px) = lens.project(&(camera_from_target * place)) else { continue };
             let within = |value: f64, size: u32| value >= 0.0 && value <= f64::from(size) - 1.0;
             if !within(px.x, lens.width) || !within(px.y, lens.height) {
                 continue;
             }
+            // The depth is that of the pixel's middle. There a bent board is a plane as deep in it as the place.
+            let pixel = px.map(f64::round);
+            let surface = camera_from_target * Translation3::new(0.0, 0.0, place.z);
+            let Ok(expected) = points::on_plane(lens, &pixel, &surface) else { continue };
             in_image += 1;
-            // Between pixels there is a depth also where some of them have none.
-            let pixel = depth.sample(px.x.round() as u32, px.y.round() as u32, far_m);
-            measured += usize::from(matches!(pixel, DepthSample::Metres(_)));
-            if let Some(depth_m) = depth.at(px, far_m) {
+            if let DepthSample::Metres(depth_m) = depth.sample(pixel.x as u32, pixel.y as u32, far_m) {
+                let depth_m = f64::from(depth_m);
                 ratios.push(depth_m / expected.z);
                 samples.push(Sample { expected, off_m: depth_m - expected.z });
             }
@@ -157,7 +158,7 @@ impl<'a> DepthCheck<'a> {
         if (in_image as f64) < LEAST_IN_IMAGE * self.places.len() as f64 {
             return;
         }
-        self.fills.push(measured as f64 / in_image as f64);
+        self.fills.push(samples.len() as f64 / in_image as f64);
         let Some(ratio) = median_high(ratios) else { return };
         let least = (LEAST_MEASURED * in_image as f64) as usize;
         if samples.len() < least {

@@ -1,4 +1,5 @@
-use nalgebra::{Isometry3, Vector2, Vector6};
+use nalgebra::{Isometry3, Matrix2, Vector2, Vector6};
+use rand::SeedableRng as _;
 
 use super::*;
 use crate::estimate::handeye::joint::{Noise, SmallSample};
@@ -6,7 +7,7 @@ use crate::estimate::handeye::{HandEye, Mode};
 use crate::estimate::{Method, calibrate};
 use crate::progress::CancelToken;
 use crate::targets::bent::BoardShape;
-use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, trial};
+use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, normal, trial};
 
 /// A calibration from the first views of a trial; the others are there to check it.
 fn calibrated(t: &Trial, views: usize, free_intrinsics: bool) -> Predictor {
@@ -94,6 +95,31 @@ fn errors_that_the_calibration_does_not_state_are_found() {
     let v = check_all(&calibrated(&t, 30, false), &later.views);
     let consistency = v.consistency.expect("stated");
     assert!(!consistency.is_consistent() && consistency.ratio > 2.0 * consistency.limit, "{consistency:?}");
+}
+
+/// Edges along the rows of pixels without anti-aliasing, distance, blur: what a detector states of one image is not what it
+/// states of another.
+#[test]
+fn captures_whose_corners_are_stated_to_be_worse_may_be_worse() {
+    let exact = Noise { corner_px: 0.02, robot_m: 1e-5, robot_rad: 2e-5, ..Noise::EXACT };
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(76);
+    let (mut ratios, mut accused) = (Vec::new(), 0);
+    for seed in 0..12 {
+        let mut t = trial(Mode::EyeInHand, 26, &exact, camera(), 400 + seed);
+        for (i, view) in t.views.iter_mut().enumerate() {
+            let more_px = if i < 20 { 0.0 } else { 0.08 };
+            for corner in view.corners.iter_mut() {
+                corner.px += Vector2::new(normal(&mut random), normal(&mut random)) * more_px;
+                corner.covariance_px2 = Some(Matrix2::identity() * (0.02_f64.powi(2) + more_px * more_px));
+            }
+        }
+        let v = check_all(&calibrated(&t, 20, true), &t.views[20..]);
+        let consistency = v.consistency.expect("stated");
+        ratios.push(consistency.ratio);
+        accused += usize::from(!consistency.is_consistent());
+    }
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    assert!((0.5..1.3).contains(&mean) && accused <= 1, "{mean}: {ratios:?}");
 }
 
 #[test]
