@@ -149,6 +149,6 @@ impl Predictor {
         let sqrt_weights = self.sqrt_weights(corners);
         let (intrinsics, shape) = (&self.intrinsics, &self.shape);
         let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights: &sqrt_weights };
-        quality::pose_of_view(&seen, &start)
+        quality::weighted_pose_of_view(&seen, &start)
     }
 }

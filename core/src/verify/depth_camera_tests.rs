@@ -103,7 +103,7 @@ fn what_covers_a_third_of_the_board_moves_nothing() {
 #[test]
 fn holes_are_counted_and_another_unit_is_named() {
     let with_holes = |_: &Isometry3<f64>, k: usize, metres: &mut f32| {
-        if (k / 640) % 4 < 2 && k % 2 == 0 {
+        if (k / 640) % 4 < 2 && k.is_multiple_of(2) {
             *metres = f32::NAN;
         }
     };

@@ -108,7 +108,7 @@ fn captures_whose_corners_are_stated_to_be_worse_may_be_worse() {
         let mut t = trial(Mode::EyeInHand, 26, &exact, camera(), 400 + seed);
         for (i, view) in t.views.iter_mut().enumerate() {
             let more_px = if i < 20 { 0.0 } else { 0.08 };
-            for corner in view.corners.iter_mut() {
+            for corner in &mut view.corners {
                 corner.px += Vector2::new(normal(&mut random), normal(&mut random)) * more_px;
                 corner.covariance_px2 = Some(Matrix2::identity() * (0.02_f64.powi(2) + more_px * more_px));
             }

@@ -8,10 +8,12 @@ use crate::estimate::handeye::joint::{
     JointProblem, JointSolution, base_from_tip_by_joints, camera_from_target, corrected_base_from_tip,
 };
 use crate::estimate::handeye::motion::MIN_VIEWS;
+use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::planar_pose::refine::refine;
 use crate::geometry::view_equations::ViewInput;
 use crate::progress::{Stage, Work};
+use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};
 
 /// Most folds of the cross-validation.
@@ -151,9 +153,7 @@ fn prediction_squares(problem: &JointProblem<'_>, fit: &State, view: &View) -> O
     } else {
         px
     };
-    let State { intrinsics, shape, .. } = fit;
-    let seen = ViewInput { intrinsics, board: problem.board, shape, corners: &view.corners, sqrt_weights: &[] };
-    let seen = pose_of_view(&seen, predicted.isometry())?;
+    let seen = pose_of_view(&fit.intrinsics, problem.board, &fit.shape, &view.corners, &predicted)?;
     let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64);
     let anchor_from_mount = problem.mode.anchor_from_mount(&base_from_tip);
     Some(Squares { px, links_px, m: board_error_m(&anchor_from_mount, &x, &seen, &y, &centre).powi(2) })
@@ -164,7 +164,18 @@ const STEPS: usize = 10;
 
 /// The target's pose from the corners of one view alone, from one nearby; `None` when that puts a corner behind the
 /// camera. Where the corners determine no pose the start is returned.
-pub(crate) fn pose_of_view(seen: &ViewInput<'_>, start: &Isometry3<f64>) -> Option<Pose<Camera, Target>> {
+pub fn pose_of_view(
+    intrinsics: &Intrinsics,
+    board: &BoardPoints,
+    shape: &BoardShape,
+    corners: &[Corner],
+    start: &Pose<Camera, Target>,
+) -> Option<Pose<Camera, Target>> {
+    weighted_pose_of_view(&ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[] }, start.isometry())
+}
+
+/// The same with corners that count as they are weighed.
+pub(crate) fn weighted_pose_of_view(seen: &ViewInput<'_>, start: &Isometry3<f64>) -> Option<Pose<Camera, Target>> {
     refine(seen, start, STEPS).map(|minimum| Pose::from_isometry(minimum.pose))
 }
 
