@@ -2,7 +2,8 @@
 //!
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
 //! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and whatever of lens,
-//! target, joints and the robot's field is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP. With
+//! target, joints and the robot's field is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP, with
+//! `J` and the pose as seen weighed by what the detector states of each corner, as in the fit. With
 //! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
 //! `√(12 n)`. The inverse is by the matrix inversion lemma, so the cost is linear in the number of captures.
