@@ -121,7 +121,8 @@ fn depth_camera(report: &DepthReport) -> Option<EstimatedValue> {
         what: text!("Depth camera"),
         value,
         meaning: text!(
-            "Measured depth of the board minus the depth at which the calibration has it, how single depths scatter, and how              many pixels of the board have one; ± is one standard deviation. The answer does not depend on it"
+            "Measured depth of the board minus the depth at which the calibration has it, how single depths scatter, and how \
+             many pixels of the board have one; ± is one standard deviation. The answer does not depend on it"
         ),
         why: None,
     })
