@@ -54,7 +54,8 @@ fn captures_that_are_excluded_or_verify_touch_no_number_and_are_named_for_what_t
     let report = handeye(&["calibrate", "-q", utf8(&session)]);
     let report = text(&report.stdout);
     assert!(report.contains("verification on 1 capture"), "{report}");
-    let checked: Vec<&str> = report.lines().skip_while(|line| !line.starts_with("verification")).skip(1).collect();
+    let section = report.lines().skip_while(|line| !line.starts_with("verification")).skip(1);
+    let checked: Vec<&str> = section.take_while(|line| line.starts_with(' ')).collect();
     assert!(checked.len() == 1 && checked[0].contains("images/0001.png"), "{checked:?}");
     assert!(!text(&handeye(&["calibrate", "-q", utf8(&without)]).stdout).contains("verification"));
 }
@@ -97,7 +98,10 @@ fn journal_and_images_are_enough_for_every_command() {
     }
     fs::remove_dir_all(session.join("depth")).expect("removed");
     fs::remove_dir_all(session.join("exports")).expect("removed");
-    assert_eq!((calibrated(&session), diagnosed(&session)), (result, diagnosis));
+    // Of a depth camera nothing is known without its images, and the answer does not depend on it.
+    assert!(result.depth.is_some_and(|depth| depth.errors.is_some()), "{:?}", result.depth);
+    let without_depths = CalibrationResult { depth: None, ..result };
+    assert_eq!((calibrated(&session), diagnosed(&session)), (without_depths, diagnosis));
     let (bare_images, bare_transforms) = views(&session, "bare");
     assert_eq!(bare_images.expect("written"), images.expect("written"));
     assert_eq!(bare_transforms.expect("written"), transforms.expect("written"));
