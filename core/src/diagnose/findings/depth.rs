@@ -1,6 +1,7 @@
 //! What is said of a depth camera.
 
 use super::{Finding, FindingCode, Severity};
+use crate::estimate::resolution;
 use crate::text;
 use crate::verify::{DepthErrors, DepthReport, Estimated};
 use crate::wording::{Text, shown};
@@ -12,13 +13,13 @@ const UNITS: [(f64, &str); 7] =
 const NEAR: f64 = 0.05;
 
 /// A finding on the depths of the captures, where they are off by more than chance and by more than the calibration itself is
-/// (95 %, metres; `None` where it states nothing, then by chance alone).
+/// (95 %, metres; `None` where it states nothing, then by more than any robot resolves).
 pub fn finding(report: &DepthReport, stated_error_m: Option<f64>) -> Option<Finding> {
     if report.is_gross() {
         return Some(gross(report.ratio));
     }
     let errors = report.errors.as_ref()?;
-    let least_m = stated_error_m.unwrap_or(0.0);
+    let least_m = stated_error_m.unwrap_or(0.0).max(resolution::PLACE_M);
     let counts = |of: Estimated, moves_m: f64| errors.is_certain(of) && (of.value * moves_m).abs() > least_m;
     let scale = errors.scale.filter(|scale| counts(*scale, errors.at_m));
     let tilt = errors.tilt_rad.iter().any(|tilt| counts(*tilt, BOARD_M));
@@ -120,6 +121,9 @@ mod tests {
         assert_eq!(finding(&report(1.0, Some(errors(2.0, 0.0))), Some(3e-3)), None, "less than the calibration is off");
         assert_eq!(finding(&report(1.0, Some(errors(0.2, 0.0))), None), None, "two standard deviations");
         assert_eq!(finding(&report(1.0, None), None), None);
+        let mut exact = errors(0.005, 0.0);
+        exact.offset_m.sigma = 1e-8;
+        assert_eq!(finding(&report(1.0, Some(exact)), None), None, "no robot resolves 0.005 mm");
     }
 
     #[test]
