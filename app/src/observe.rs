@@ -1,7 +1,7 @@
 //! From a dataset folder or a session to observations: loading every image and finding the target in it.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use handeye_core::detect::{self, DetectOptions, VisionError};
@@ -10,8 +10,9 @@ use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::{Dataset, DatasetError};
 use handeye_core::project::files::image_file::{self, gray_from_rgb};
-use handeye_core::project::session::{CaptureId, Session, SessionError, SessionObservations};
-use handeye_core::targets::observation::Corner;
+use handeye_core::project::session::{CaptureId, CaptureRecord, Session, SessionError, SessionObservations};
+use handeye_core::targets::depth_plane::DepthPlane;
+use handeye_core::targets::observation::{Corner, Sight};
 use handeye_core::targets::{AprilTag, Grid, TargetSpec};
 use rayon::prelude::*;
 
@@ -106,9 +107,29 @@ pub fn observe_session(
     let image_of = |index: usize| Ok(Some(gray_from_rgb(&session.load_rgb(&captures[index])?)));
     let names: Vec<&str> = captures.iter().map(|capture| capture.image.as_str()).collect();
     let corners = corners_of(&names, image_of, target, progress, cancel)?;
-    let corners: BTreeMap<CaptureId, Vec<Corner>> =
-        captures.iter().zip(corners).filter_map(|(capture, corners)| Some((capture.id, corners?))).collect();
-    Ok(session.document.observations(image_size, |id| corners.get(&id).cloned()))
+    let sight = |(capture, corners): (&CaptureRecord, Option<Vec<Corner>>)| {
+        let corners = corners?;
+        let depth = depth_plane(&session.folder, capture, image_size, &corners, target);
+        Some((capture.id, Sight { corners, depth }))
+    };
+    let seen: Vec<_> = captures.iter().zip(corners).collect();
+    let sights: BTreeMap<CaptureId, Sight> = seen.into_par_iter().filter_map(sight).collect();
+    Ok(session.document.observations(image_size, |id| sights.get(&id).cloned()))
+}
+
+/// The plane of the target by the depths of a capture. A depth image that cannot be read is as none: corners are enough for an answer.
+pub fn depth_plane(
+    folder: &Path,
+    capture: &CaptureRecord,
+    image_size: (u32, u32),
+    corners: &[Corner],
+    target: &TargetSpec,
+) -> Option<DepthPlane> {
+    let depth = capture.load_depth_m(folder).unwrap_or_else(|error| {
+        tracing::warn!(%error, "the depth of a capture cannot be read");
+        None
+    });
+    DepthPlane::new(&depth?, image_size, corners, target)
 }
 
 /// Finds the target in images that belong to no data set yet, on all cores. One that cannot be read shows nothing.

@@ -9,6 +9,7 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::image::{RgbImage, imageops};
 use handeye_core::project::session::{Capture, CaptureId, Role, SessionError, Store};
 use handeye_core::targets::TargetSpec;
+use handeye_core::targets::depth_plane::DepthPlane;
 use handeye_core::targets::observation::Corner;
 
 use crate::model::CapturePurpose;
@@ -44,6 +45,8 @@ pub struct Measured {
     pub corner_noise_px: Option<f64>,
     /// The board's points in the mean image.
     pub corners: Vec<Corner>,
+    /// The plane of the target by its depths.
+    pub depth_plane: Option<DepthPlane>,
     /// Name of the pose, from the request.
     pub pose_name: Option<String>,
     /// The mean image, small, with nothing drawn on it.

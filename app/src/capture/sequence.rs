@@ -7,6 +7,7 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::TargetSpec;
+use handeye_core::targets::depth_plane::DepthPlane;
 use handeye_core::targets::observation::Corner;
 
 use super::refusal::{self, Why};
@@ -121,6 +122,7 @@ impl Sequence {
             purpose: self.request.purpose,
             target: self.target,
             thumbnail: thumbnail(&rgb),
+            depth_plane: depth.as_ref().and_then(|it| DepthPlane::new(it, rgb.dimensions(), &corners, &self.target)),
             rgb: Arc::new(rgb),
             depth,
             base_from_tip: *base_from_tip,

@@ -168,11 +168,12 @@ impl Solution {
         let (folder, document) = (Some(self.folder.clone()), Arc::clone(&self.input.document));
         recorder.note(Entry::Document { folder, document });
         let SessionObservations { observations, captures, verification } = &self.input.seen;
-        let fitted = captures.iter().zip(&observations.views).map(|(id, view)| (id, view.corners.clone()));
-        let verifying = verification.iter().map(|(id, view)| (id, Some(view.corners.clone())));
-        for (id, corners) in fitted.chain(verifying) {
+        let fitted = captures.iter().zip(&observations.views).map(|(id, view)| (id, view.corners.clone(), view.depth));
+        let verifying = verification.iter().map(|(id, view)| (id, Some(view.corners.clone()), view.depth));
+        for (id, corners, depth) in fitted.chain(verifying) {
             let observed = Observed {
                 corners: corners.map(|corners| corners.to_vec()),
+                depth,
                 image_size: observations.image_size,
                 // Nobody looks at small copies here.
                 thumbnail: Arc::default(),
@@ -194,8 +195,7 @@ pub fn folder(
     cancel: &CancelToken,
 ) -> Result<Solution, Failure> {
     let input = read(path, cancel)?;
-    let recorded = Some((path.to_path_buf(), Arc::clone(&input.document)));
-    let job = SolveJob { recorded, goal_m, truth, ..job(&input, method, options) };
+    let job = SolveJob { goal_m, truth, ..job(&input, method, options) };
     let solved =
         worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path, &input.seen.observations, cancel))?;
     Ok(Solution::new(path, input, solved))
@@ -205,17 +205,7 @@ pub fn folder(
 pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
     let SessionObservations { observations, captures, verification } = input.seen.clone();
     let goal_m = Goal::default().0;
-    SolveJob {
-        id: JobId(0),
-        observations,
-        captures,
-        verification,
-        recorded: None,
-        method,
-        options,
-        goal_m,
-        truth: None,
-    }
+    SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, truth: None }
 }
 
 /// Where there is no answer the data may be at fault: how the poses were written is said at once, the rest by the doctor.

@@ -160,7 +160,8 @@ mod tests {
     fn thumbnails_on_the_screen_stay_however_many_were_seen_before() {
         let ctx = Context::default();
         let mut thumbnails = Thumbnails::default();
-        let observed = Observed { corners: None, image_size: (4, 3), thumbnail: Arc::new(RgbImage::new(4, 3)) };
+        let observed =
+            Observed { corners: None, depth: None, image_size: (4, 3), thumbnail: Arc::new(RgbImage::new(4, 3)) };
         let mut frame = |ids: std::ops::RangeInclusive<u32>| {
             ctx.run_ui(egui::RawInput::default(), |_| {
                 for id in ids.clone() {

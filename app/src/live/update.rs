@@ -68,7 +68,7 @@ impl App {
         // bent as the calibration found it.
         let seen = self.model.detection.as_ref().and_then(|it| {
             let board = calibrated.board(&self.model.document().meta.target);
-            let seen = calibrated.seen(&board, it.corners.as_ref()?, &it.camera_from_target?)?;
+            let seen = calibrated.seen(&board, (it.corners.as_ref()?, None), &it.camera_from_target?)?;
             Some((seen, it.base_from_tip?))
         });
         let from_board = match seen {

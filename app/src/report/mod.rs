@@ -218,6 +218,15 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
     if let Some(print) = &estimate.print {
         out.push(format!("print of the target off its drawing: {:.4} mm RMS per axis", print.rms_mm));
     }
+    if let Some(depths) = &estimate.depths {
+        let verdict = if depths.accepted { "taken" } else { "not taken" };
+        let (before, after) = (depths.heldout_before_px, depths.heldout_after_px);
+        let noise = shown(depths.noise_mm, 3);
+        out.push(format!(
+            "depths of {} captures: {verdict}, noise {noise} mm, held-out error {before:.4} → {after:.4} px",
+            depths.captures
+        ));
+    }
     if let Some(distortion) = &estimate.residual_distortion {
         out.push(format!("lens beyond its model: {:.4} px RMS over the corners", distortion.rms_px));
     }

@@ -21,7 +21,7 @@ fn document(captures: &[u32]) -> Entry {
 }
 
 fn observed(id: u32, width: u32) -> Entry {
-    let observed = Observed { corners: None, image_size: (width, 1), thumbnail: Arc::default() };
+    let observed = Observed { corners: None, depth: None, image_size: (width, 1), thumbnail: Arc::default() };
     Entry::Observed { id: CaptureId(id), observed: Arc::new(observed) }
 }
 

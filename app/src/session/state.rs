@@ -6,6 +6,7 @@ use std::sync::Arc;
 use handeye_core::geometry::arm::JointValues;
 use handeye_core::image::RgbImage;
 use handeye_core::project::session::{CaptureId, Document, Edit};
+use handeye_core::targets::depth_plane::DepthPlane;
 use handeye_core::targets::observation::Corner;
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +49,8 @@ pub struct RecentSession {
 pub struct Observed {
     /// The corners; `None` when the board is not found.
     pub corners: Option<Vec<Corner>>,
+    /// The plane of the board by the depths of the image; `None` where none were measured.
+    pub depth: Option<DepthPlane>,
     /// Width and height of the image in pixels.
     pub image_size: (u32, u32),
     /// A small copy of the image.

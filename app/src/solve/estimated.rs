@@ -2,7 +2,7 @@
 
 use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_core::estimate::handeye::joint::PrintErrors;
-use handeye_core::estimate::{Calibration, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_core::estimate::{Calibration, DepthsInFit, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
 use handeye_core::verify::{DepthErrors, DepthReport};
 use handeye_core::wording::shown;
 
@@ -30,7 +30,8 @@ pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<
     let mut lines = Vec::new();
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
-    lines.extend(depth.and_then(depth_camera));
+    let depths = calibration.joint.as_ref().and_then(|joint| joint.depths.as_ref());
+    lines.extend(depth.and_then(|report| depth_camera(report, depths.map(|depths| &depths.in_fit))));
     let Some(joint) = &calibration.joint else { return lines };
     if let Some(shape) = &joint.shape {
         lines.extend(bend(shape));
@@ -103,7 +104,7 @@ fn print(print: &PrintErrors) -> EstimatedValue {
     }
 }
 
-fn depth_camera(report: &DepthReport) -> Option<EstimatedValue> {
+fn depth_camera(report: &DepthReport, in_fit: Option<&DepthsInFit>) -> Option<EstimatedValue> {
     let value = if report.is_gross() {
         text!("{ratio} times what is expected", ratio = shown(report.ratio, 3))
     } else {
@@ -117,14 +118,34 @@ fn depth_camera(report: &DepthReport) -> Option<EstimatedValue> {
             fill = format!("{:.0}", report.fill * 1e2)
         )
     };
+    let why = match in_fit {
+        Some(depths) if depths.accepted && depths.turned => text!(
+            "The answer uses the depths, and leaves open how far the depth camera is turned: views left out are predicted to {after} px \
+             with them and {before} px without",
+            after = format!("{:.3}", depths.heldout_after_px),
+            before = format!("{:.3}", depths.heldout_before_px)
+        ),
+        Some(depths) if depths.accepted => text!(
+            "The answer uses the depths, as measured along the lens: views left out are predicted to {after} px with them and \
+             {before} px without",
+            after = format!("{:.3}", depths.heldout_after_px),
+            before = format!("{:.3}", depths.heldout_before_px)
+        ),
+        Some(depths) => text!(
+            "The answer does not use the depths: views left out are predicted to {after} px with them and {before} px without",
+            after = format!("{:.3}", depths.heldout_after_px),
+            before = format!("{:.3}", depths.heldout_before_px)
+        ),
+        None => text!("The answer does not depend on the depths"),
+    };
     Some(EstimatedValue {
         what: text!("Depth camera"),
         value,
         meaning: text!(
             "Measured depth of the board minus the depth at which the calibration has it, how single depths scatter, and how \
-             many pixels of the board have one; ± is one standard deviation. The answer does not depend on it"
+             many pixels of the board have one; ± is one standard deviation"
         ),
-        why: None,
+        why: Some(why),
     })
 }
 

@@ -11,6 +11,7 @@ use handeye_core::targets::TargetSpec;
 use crate::capture::thumbnail;
 use crate::command::Event;
 use crate::model::{Observed, Severity};
+use crate::observe;
 use crate::text;
 use crate::text::Text;
 use crate::worker::link::Outlet;
@@ -51,9 +52,9 @@ fn look(job: &ObserveJob, capture: &CaptureRecord, cancel: &CancelToken) -> Resu
     let path = job.folder.join(&capture.image);
     let rgb = handeye_core::project::files::image_file::load_rgb(&path)?;
     let seen = observe_image(&rgb, &job.target, cancel)?;
-    Ok(Observed {
-        corners: seen.map(|seen| seen.corners),
-        image_size: rgb.dimensions(),
-        thumbnail: Arc::new(thumbnail(&rgb)),
-    })
+    let corners = seen.map(|seen| seen.corners);
+    let depth = corners
+        .as_ref()
+        .and_then(|corners| observe::depth_plane(&job.folder, capture, rgb.dimensions(), corners, &job.target));
+    Ok(Observed { corners, depth, image_size: rgb.dimensions(), thumbnail: Arc::new(thumbnail(&rgb)) })
 }

@@ -7,7 +7,7 @@ use handeye_core::estimate::uncertainty::quality::TipBox;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::progress::Stage;
 use handeye_core::project::session::{CaptureId, Document, SessionObservations};
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Sight};
 
 use super::question::Question;
 use crate::app::App;
@@ -93,9 +93,14 @@ impl App {
         self.model.observed(id)?.corners.as_ref()
     }
 
+    fn sight(&self, id: CaptureId) -> Option<Sight> {
+        let observed = self.model.observed(id)?;
+        Some(Sight { corners: observed.corners.clone()?, depth: observed.depth })
+    }
+
     /// What was observed in the captures.
     pub(crate) fn seen(&self, document: &Document) -> SessionObservations {
-        document.observations(self.image_size(), |id| self.corners(id).cloned())
+        document.observations(self.image_size(), |id| self.sight(id))
     }
 
     /// Whether the present question was asked, of captures that have all been looked at.
@@ -112,7 +117,6 @@ impl App {
             observations,
             captures,
             verification,
-            recorded: self.model.session.folder.clone().map(|folder| (folder, Arc::new(document.clone()))),
             method: Method::by_name(&self.model.method).unwrap_or_default(),
             options: Options { keep_outliers: self.model.keep_outliers, ..Options::default() },
             goal_m: self.model.view.goal.0,

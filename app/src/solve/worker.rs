@@ -2,20 +2,18 @@
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::depth::DepthImage;
 use handeye_core::diagnose::doctor;
 use handeye_core::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_core::estimate::handeye::HandEyeError;
 use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options, ViewStatus};
 use handeye_core::progress::{CancelToken, Progress, Work};
 use handeye_core::project::result::{DepthSummary, VerificationSummary, solve_options};
-use handeye_core::project::session::{CaptureId, Document};
+use handeye_core::project::session::CaptureId;
 use handeye_core::targets::bent::BoardShape;
 use handeye_core::targets::observation::View;
-use handeye_core::verify::{self, CheckCapture, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
+use handeye_core::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
 
 use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
@@ -25,9 +23,6 @@ use crate::worker::link::Outlet;
 
 /// Progress is told when it has come so much further: a window that is drawn for every step would slow the solve down.
 const PROGRESS_STEP: f64 = 0.05;
-
-/// Where nothing reflects a sensor reports its far plane, which no board is at, so that it need not be known.
-const FAR_M: f32 = f32::INFINITY;
 
 /// A set of captures to calibrate.
 pub struct SolveJob {
@@ -39,8 +34,6 @@ pub struct SolveJob {
     pub captures: Vec<CaptureId>,
     /// What was observed in captures that never enter the fit.
     pub verification: Vec<(CaptureId, View)>,
-    /// Where all of them are recorded, with the depths that were measured.
-    pub recorded: Option<(PathBuf, Arc<Document>)>,
     /// Which answer is asked for.
     pub method: Method,
     /// What is changed about it.
@@ -95,25 +88,22 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
 pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
     let mut findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
+    if work.is_cancelled() {
+        return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
+    }
     let options = solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
-    let depth = depth_camera(job, &calibration, work)?;
+    let depth = depth_camera(job, &calibration);
     findings.extend(depth.as_ref().and_then(|depth| depth_finding(depth, calibration.tip_error_95_m())));
     sort(&mut findings);
     result.depth = depth.as_ref().map(DepthSummary::from);
     result.findings = findings.iter().map(Finding::to_record).collect();
     let calibrated = Predictor::new(&calibration).ok();
     let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
-        let depths: Vec<Option<DepthImage>> = job.verification.iter().map(|(id, _)| recorded_depth(job, *id)).collect();
-        let captures: Vec<CheckCapture<'_>> = job
-            .verification
-            .iter()
-            .zip(&depths)
-            .map(|((_, view), depth)| CheckCapture { view, depth: depth.as_ref(), far_m: FAR_M })
-            .collect();
+        let captures: Vec<&View> = job.verification.iter().map(|(_, view)| view).collect();
         verify::verify(calibrated, &job.observations.target, &captures, work)
     });
     if let Some(Err(VerifyError::Cancelled)) = verification {
@@ -135,36 +125,20 @@ pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) ->
 }
 
 /// What the depths of the captures in the fit say of a depth camera.
-fn depth_camera(
-    job: &SolveJob,
-    calibration: &Calibration,
-    work: Work<'_>,
-) -> Result<Option<DepthReport>, CalibrateError> {
-    let Some(lens) = calibration.intrinsics() else { return Ok(None) };
+fn depth_camera(job: &SolveJob, calibration: &Calibration) -> Option<DepthReport> {
+    let lens = calibration.intrinsics()?;
     let shape =
         calibration.joint.as_ref().and_then(|joint| joint.shape).map_or_else(BoardShape::default, |it| it.shape);
     let mut check = DepthCheck::new(&lens, &job.observations.target, &shape);
-    for (view, id) in calibration.views.iter().zip(&job.captures) {
-        if work.is_cancelled() {
-            return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
-        }
+    for (view, observed) in calibration.views.iter().zip(&job.observations.views) {
         let used = view.camera_from_target.filter(|_| view.status == ViewStatus::Used);
-        if let Some((board, depth)) = used.and_then(|board| Some((board, recorded_depth(job, *id)?))) {
-            check.add(&depth, FAR_M, board.isometry());
+        if let Some((board, depth)) = used.zip(observed.depth) {
+            check.add(&depth, board.isometry());
         }
     }
     let sigma_px = calibration.camera.and_then(|camera| camera.sigma_px);
-    Ok(check.finish(sigma_px.map_or(0.0, |sigma| sigma[0])))
-}
-
-/// The depth that was measured in a capture. One that cannot be read is as none: the answer does not depend on it.
-fn recorded_depth(job: &SolveJob, id: CaptureId) -> Option<DepthImage> {
-    let (folder, document) = job.recorded.as_ref()?;
-    let depth = document.capture(id)?.load_depth_m(folder);
-    depth.unwrap_or_else(|error| {
-        tracing::warn!(%error, "the depth of a capture cannot be read");
-        None
-    })
+    let in_fit = calibration.joint.as_ref().and_then(|joint| joint.depths.as_ref());
+    check.finish(sigma_px.map_or(0.0, |sigma| sigma[0]), in_fit.map(|depths| &depths.in_fit))
 }
 
 fn summary(verification: &Verification) -> VerificationSummary {
@@ -179,25 +153,22 @@ fn summary(verification: &Verification) -> VerificationSummary {
 
 #[cfg(test)]
 mod tests {
+    use handeye_core::depth::DepthImage;
     use handeye_core::diagnose::findings::FindingCode;
-    use handeye_core::image::RgbImage;
     use handeye_core::project::result::CalibrationResult;
-    use handeye_core::project::session::{Capture, Role, Session, Store};
+    use handeye_core::targets::depth_plane::DepthPlane;
 
     use super::*;
     use crate::gui::testing::sample;
-    use crate::session::start;
 
     /// A depth camera that puts everything 2 mm and a part in a hundred too far away.
     #[test]
     fn what_the_depths_of_the_captures_are_off_is_in_the_result_and_said() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut store =
-            Store::create(folder.path(), start::meta(None, "2026-05-02T10:11:12Z".to_owned())).expect("a session");
         let model = sample::solved();
         let solved = model.solve.solved.as_ref().expect("solved");
         let lens = solved.calibration.intrinsics().expect("a lens");
-        for (view, id) in solved.calibration.views.iter().zip(&solved.captures) {
+        let mut observations = sample::observations();
+        for (view, observed) in solved.calibration.views.iter().zip(&mut observations.views) {
             let board = view.camera_from_target.expect("fitted");
             let normal = board.isometry().rotation * nalgebra::Vector3::z();
             let metres = (0..640 * 480).map(|i| {
@@ -206,21 +177,14 @@ mod tests {
                 (normal.dot(&board.translation()) / ray * 1.01 + 0.002) as f32
             });
             let depth = DepthImage::new(640, 480, metres.collect()).expect("as many as pixels");
-            let record = model.document().capture(*id).expect("a capture");
-            let image = RgbImage::new(640, 480);
-            store
-                .add_capture(&Capture { depth_m: Some(&depth), ..Capture::new(&image, record.base_from_tip) })
-                .expect("written");
+            let corners = observed.corners.as_ref().expect("seen");
+            observed.depth = DepthPlane::new(&depth, (640, 480), corners, &observations.target);
         }
-        drop(store);
-        let document = Session::open(folder.path()).expect("a session").document;
-        let captures = document.captures.iter().map(|capture| capture.id).collect();
         let job = SolveJob {
             id: JobId(1),
-            observations: sample::observations(),
-            captures,
+            observations,
+            captures: solved.captures.clone(),
             verification: Vec::new(),
-            recorded: Some((folder.path().to_path_buf(), document)),
             method: Method::Joint,
             options: Options::default(),
             goal_m: 5e-4,
@@ -244,27 +208,20 @@ mod tests {
     /// A depth camera beside the lens: what it measured at the board stands beside what the calibration predicts.
     #[test]
     fn the_depth_of_a_capture_for_verification_is_compared_with_that_of_the_board() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut store =
-            Store::create(folder.path(), start::meta(None, "2026-05-02T10:11:12Z".to_owned())).expect("a session");
-        let image = RgbImage::new(640, 480);
         let depth = DepthImage::new(640, 480, vec![0.4; 640 * 480]).expect("as many as pixels");
         let model = sample::solved();
         let solved = model.solve.solved.as_ref().expect("solved");
-        let verified = solved.verified_captures[0];
-        let record = model.document().capture(verified).expect("a capture");
-        let capture =
-            Capture { depth_m: Some(&depth), role: Role::Verification, ..Capture::new(&image, record.base_from_tip) };
-        let id = store.add_capture(&capture).expect("written");
-        drop(store);
-        let corners = model.observed(verified).and_then(|seen| seen.corners.clone()).expect("seen");
-        let document = Session::open(folder.path()).expect("a session").document;
+        let id = solved.verified_captures[0];
+        let record = model.document().capture(id).expect("a capture");
+        let corners = model.observed(id).and_then(|seen| seen.corners.clone()).expect("seen");
+        let observations = sample::observations();
+        let plane = DepthPlane::new(&depth, (640, 480), &corners, &observations.target);
+        let view = View::new(record.image.clone(), record.base_from_tip.expect("a pose"), corners);
         let job = SolveJob {
             id: JobId(1),
-            observations: sample::observations(),
+            observations,
             captures: solved.captures.clone(),
-            verification: vec![(id, View::new(record.image.clone(), record.base_from_tip.expect("a pose"), corners))],
-            recorded: Some((folder.path().to_path_buf(), document)),
+            verification: vec![(id, View { depth: plane, ..view.clone() })],
             method: Method::Joint,
             options: Options::default(),
             goal_m: 5e-4,
@@ -280,6 +237,6 @@ mod tests {
             .z;
         let measured = off_m(&job).expect("a depth camera is there");
         assert!((measured - (0.4 - seen_m)).abs() < 0.1, "{measured} m, the board is at {seen_m} m");
-        assert_eq!(off_m(&SolveJob { recorded: None, ..job }), None);
+        assert_eq!(off_m(&SolveJob { verification: vec![(id, view)], ..job }), None);
     }
 }

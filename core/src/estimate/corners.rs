@@ -5,8 +5,8 @@ use super::lens::Lens;
 use super::refine::{self, Judged, Refined};
 use super::residuals::{residuals, squared_residuals};
 use super::{
-    CalibrateError, CalibratedCamera, Calibration, JointFit, LinkCovariances, Method, Observations, Options,
-    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
+    CalibrateError, CalibratedCamera, Calibration, JointDepths, JointFit, LinkCovariances, Method, Observations,
+    Options, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::Consensus;
@@ -156,7 +156,7 @@ impl Session<'_> {
     /// The problem that a joint estimate solved.
     pub fn problem<'p>(&self, refined: &Refined, of: &'p Fitted, lens: Option<LensPrior<'p>>) -> JointProblem<'p> {
         let all = JointProblem::new(self.mode, &of.board, &of.views);
-        let problem = JointProblem { weights: refined.weights, lens_prior: lens, ..all };
+        let problem = JointProblem { weights: refined.weights, depth: refined.depth_weight(), lens_prior: lens, ..all };
         refine::kept_problem(&problem, &of.views, &refined.screened.solution)
     }
 
@@ -291,6 +291,7 @@ fn with_robot(
         views.push(View {
             corners: s.corners.clone(),
             tip_by_joint: s.view.tip_by_joint.clone(),
+            depth: s.view.depth,
             ..View::new(s.view.name.clone(), base_from_tip, Vec::new())
         });
         pairs.push(PosePair {
@@ -335,6 +336,7 @@ fn take_joint(
         heldout_links_rms_px: judged.heldout.map(|held| held.links_rms_px),
         field: solution.field.clone(),
         print: refined.print.clone(),
+        depths: refined.depths.map(|in_fit| JointDepths { in_fit, bias: solution.depth }),
         residual_distortion: refined.distortion.clone(),
         expected_heldout_rms_px: judged.expected_heldout_rms_px,
         robot_effect_px: judged.robot_effect_px,

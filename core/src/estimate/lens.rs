@@ -148,7 +148,7 @@ fn alternatives(
     let poses: Vec<PlanarPose> = (kept.iter().zip(&found.camera_from_target).zip(&found.rms_px).zip(&found.mirrored))
         .map(|(((corners, pose), rms_px), mirrored)| {
             let (intrinsics, shape) = (&found.intrinsics, &found.shape);
-            let view = ViewInput { intrinsics, board: &board, shape, corners, sqrt_weights: &[] };
+            let view = ViewInput { intrinsics, board: &board, shape, corners, sqrt_weights: &[], depths: None };
             let best = Solution { camera_from_target: *pose, rms_px: *rms_px };
             PlanarPose { best, alternative: mirrored.and_then(|near| planar_pose::other(&view, &best, &near)) }
         })

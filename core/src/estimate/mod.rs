@@ -20,13 +20,13 @@ mod two_poses;
 pub mod uncertainty;
 mod wrong_corners;
 
-use nalgebra::{DMatrix, Matrix6, Point3, Vector2, Vector6};
+use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2, Vector6};
 
 use crate::estimate::claim::{Alternative, Claim};
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{
-    CornerWeights, Free, Noise, PrintErrors, RobotField, ShownDistortion, SmallSample,
+    CornerWeights, DepthWeight, Free, Noise, PrintErrors, RobotField, ShownDistortion, SmallSample,
 };
 use crate::estimate::handeye::one_axis::PartialHandEye;
 use crate::estimate::handeye::screening::Distance;
@@ -38,9 +38,11 @@ use crate::estimate::uncertainty::widening::Widening;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::geometry::planar_pose::PoseError;
+pub use crate::geometry::view_equations::DepthBias;
 use crate::progress::{Stage, Work};
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
+use crate::targets::depth_plane::DepthPlane;
 use crate::targets::observation::{Corner, Corners, View};
 
 /// What was observed, from a dataset folder, a session or a live capture.
@@ -69,6 +71,8 @@ pub struct ObservedView {
     pub corners: Option<Corners>,
     /// How the tip turns with each joint, as in [`crate::targets::observation::View::tip_by_joint`]; empty where it is not known.
     pub tip_by_joint: Vec<Vector6<f64>>,
+    /// The plane of the target by the depths of the image; `None` where none were measured.
+    pub depth: Option<DepthPlane>,
     /// A target pose measured elsewhere, used when there are no corners.
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Whether the view takes part; one that does not is listed as [`ViewStatus::Excluded`] and touches no number.
@@ -83,6 +87,7 @@ impl ObservedView {
             base_from_tip,
             corners: corners.map(Corners::from),
             tip_by_joint: Vec::new(),
+            depth: None,
             camera_from_target: None,
             in_fit: true,
         }
@@ -94,6 +99,7 @@ impl From<&View> for ObservedView {
     fn from(view: &View) -> Self {
         Self {
             tip_by_joint: view.tip_by_joint.clone(),
+            depth: view.depth,
             corners: Some(view.corners.clone()),
             ..Self::new(view.name.clone(), Some(view.base_from_tip), None)
         }
@@ -183,6 +189,47 @@ pub struct JointOffsets {
     pub heldout_after_px: f64,
     /// Whether the answer uses them.
     pub accepted: bool,
+}
+
+/// What an attempt at the depths of the views gave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthsInFit {
+    /// Views with depths.
+    pub views: usize,
+    /// Noise of the depths of a view, which all of them have in common, metres.
+    pub noise_m: f64,
+    /// How they count against corners.
+    pub weight: DepthWeight,
+    /// Whether the answer leaves it open how far the depth camera is turned against the lens, and does not take it for straight.
+    pub turned: bool,
+    /// Probability that it is the other way.
+    pub other_probability: f64,
+    /// Errors of the depth camera where that is left open.
+    pub bias: DepthBias,
+    /// Their covariance, in the order of [`DepthBias`].
+    pub covariance: Matrix5<f64>,
+    /// Error on held-out views without them, pixels.
+    pub heldout_before_px: f64,
+    /// And with them.
+    pub heldout_after_px: f64,
+    /// Whether the answer uses them.
+    pub accepted: bool,
+}
+
+impl DepthsInFit {
+    /// How they count, where the answer uses them.
+    pub fn weight(&self) -> Option<DepthWeight> {
+        self.accepted.then_some(self.weight)
+    }
+}
+
+/// The depths of the views as the joint estimate has them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointDepths {
+    /// What the attempt gave.
+    pub in_fit: DepthsInFit,
+    /// Errors of the depth camera as the answer has them; none where it does not use the depths.
+    pub bias: DepthBias,
 }
 
 /// The shape of the target where it is not the one drawn.
@@ -481,6 +528,8 @@ pub struct JointFit {
     pub size: Option<TargetSize>,
     /// What an attempt at joint offsets gave; `None` when there was none.
     pub joint_offsets: Option<JointOffsets>,
+    /// What an attempt at the depths of the views gave; `None` when there was none.
+    pub depths: Option<JointDepths>,
 }
 
 impl JointFit {
@@ -657,3 +706,7 @@ fn chosen(methods: &[MethodResult], name: &str) -> Result<ClosedFormSolution, Ha
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+#[path = "depths_tests.rs"]
+mod depths_tests;

@@ -4,15 +4,17 @@ use nalgebra::Vector2;
 
 use super::bend::{Deflection, may_be_shown};
 use super::lens::Lens;
-use super::{CalibrateError, JointOffsets, MethodResult, Options, TargetSize, size};
+use super::{CalibrateError, DepthsInFit, JointOffsets, MethodResult, Options, TargetSize, size};
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::{Consensus, consensus};
 use crate::estimate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::print_errors::{self, with_shown_print};
 use crate::estimate::handeye::joint::residual_distortion::{corrected, with_its_error, with_shown_distortion};
+use crate::estimate::handeye::joint::with_depths::{OtherModel, with_depths};
 use crate::estimate::handeye::joint::{
-    self, CornerWeights, Free, JointProblem, JointSolution, JointStart, PrintErrors, ShownDistortion, with_shown_field,
+    self, CornerWeights, DepthWeight, Free, JointProblem, JointSolution, JointStart, PrintErrors, ShownDistortion,
+    with_shown_field,
 };
 use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::{HandEyeError, PosePair, determined};
@@ -33,6 +35,10 @@ pub struct Refined {
     pub weights: Option<CornerWeights>,
     /// What an attempt at joint offsets gave; `None` when there was none.
     pub joints: Option<JointOffsets>,
+    /// What an attempt at the depths of the views gave; `None` when there was none.
+    pub depths: Option<DepthsInFit>,
+    /// What the other model of the depth camera adds, where the answer uses its depths.
+    pub other_depths: Option<OtherModel>,
     /// What the points of the target are off their drawing, where the data show it.
     pub print: Option<PrintErrors>,
     /// What the lens does beyond its model, where the data show it; it is taken off the corners of the views.
@@ -124,7 +130,9 @@ pub fn refine(
     if let Some(with_field) = with_shown_field(&problem, &screened.kept_views(), &screened.solution, *work)? {
         screened = again(&JointProblem { free: with_field.free, ..problem }, with_field, screened)?;
     }
-    Ok(Refined { screened, weights, joints, print, distortion: None })
+    let (depths, other_depths) = depths(&problem, &mut screened, work)?.unzip();
+    let other_depths = other_depths.flatten();
+    Ok(Refined { screened, weights, joints, depths, other_depths, print, distortion: None })
 }
 
 impl Refined {
@@ -161,6 +169,11 @@ impl Refined {
         Ok(self)
     }
 
+    /// See [`JointProblem::depth`].
+    pub fn depth_weight(&self) -> Option<DepthWeight> {
+        self.depths.and_then(|depths| depths.weight())
+    }
+
     /// The target of the fit.
     pub fn board(&self, drawn: &BoardPoints) -> BoardPoints {
         self.print.as_ref().map_or_else(|| drawn.clone(), |print| print.on(drawn))
@@ -170,6 +183,9 @@ impl Refined {
     pub fn stated(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let solution = self.screened.solution.clone();
         self.screened.solution = joint::with_stated_error(problem, solution, work.cancel)?;
+        if let Some(other) = &self.other_depths {
+            self.screened.solution.covariance = other.mixed(&self.screened.solution.covariance);
+        }
         if let Some(shown) = &mut self.print {
             let solution = self.screened.solution.clone();
             self.screened.solution = print_errors::with_its_error(problem, solution, shown, work.cancel)?;
@@ -299,6 +315,48 @@ fn offsets(
         screened.solution = solution;
     }
     Ok(Some(found))
+}
+
+/// Probability that views left out are predicted worse by chance, below which they are worse: one session in twenty goes without
+/// depths that are right. That is cheap, and depths that are not harm.
+const WORSE_BY_CHANCE: f64 = 0.05;
+
+/// Tries the depths of the views, and takes them unless they make predictions of held-out views worse by more than chance. That
+/// they make them better is seldom seen: they tell what corners do not.
+fn depths(
+    problem: &JointProblem<'_>,
+    screened: &mut Screened,
+    work: &Work<'_>,
+) -> Result<Option<(DepthsInFit, Option<OtherModel>)>, HandEyeError> {
+    let views = screened.kept_views();
+    let without = kept_problem(problem, &views, &screened.solution);
+    let Some(found) = with_depths(&without, &screened.solution, work.cancel)? else { return Ok(None) };
+    let free = found.solution.free;
+    let with = JointProblem { free, depth: Some(found.weight), ..without };
+    let before = quality::held_out_squares_px(&without, &screened.solution, work.cancel)?;
+    let after = quality::held_out_squares_px(&with, &found.solution, work.cancel)?;
+    let (Some(before), Some(after)) = (before, after) else { return Ok(None) };
+    let corners: usize = views.iter().map(|view| view.corners.len()).sum();
+    let rms_px = |squares: &[f64]| (squares.iter().sum::<f64>() / corners as f64).sqrt();
+    let (heldout_before_px, heldout_after_px) = (rms_px(&before), rms_px(&after));
+    let losses: Vec<f64> = before.iter().zip(&after).map(|(before, after)| after - before).collect();
+    let accepted = better_by_chance(&losses) >= WORSE_BY_CHANCE;
+    let depths = DepthsInFit {
+        views: found.views,
+        noise_m: found.solution.noise.corner_px / found.weight.px_per_m,
+        weight: found.weight,
+        turned: found.weight.is_turned(),
+        other_probability: found.other.probability,
+        bias: found.open.0,
+        covariance: found.open.1,
+        heldout_before_px,
+        heldout_after_px,
+        accepted,
+    };
+    if accepted {
+        screened.solution = found.solution;
+    }
+    Ok(Some((depths, accepted.then_some(found.other))))
 }
 
 /// What needs the whole problem.

@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, Vector2, Vector6};
 
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::targets::TargetSpec;
+use crate::targets::depth_plane::DepthPlane;
 
 /// One point of the target found in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +84,15 @@ impl<'a> IntoIterator for &'a mut Corners {
     }
 }
 
+/// What one image shows of the target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sight {
+    /// Its points.
+    pub corners: Vec<Corner>,
+    /// Its plane by the depths of the image; `None` where none were measured.
+    pub depth: Option<DepthPlane>,
+}
+
 /// One image of the target and the robot pose it was taken at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
@@ -95,12 +105,14 @@ pub struct View {
     /// How the tip turns with each joint: entry `j` is the twist `[t; r]` per radian with which joint `j` perturbs
     /// `base_from_tip` on the right, metres and radians. Empty where the joint angles or the arm are not known.
     pub tip_by_joint: Vec<Vector6<f64>>,
+    /// The plane of the target by the depths of the image; `None` where none were measured.
+    pub depth: Option<DepthPlane>,
 }
 
 impl View {
     /// A view of a robot whose joints are not known.
     pub fn new(name: String, base_from_tip: Pose<Base, Tip>, corners: Vec<Corner>) -> Self {
-        Self { name, base_from_tip, corners: corners.into(), tip_by_joint: Vec::new() }
+        Self { name, base_from_tip, corners: corners.into(), tip_by_joint: Vec::new(), depth: None }
     }
 }
 

@@ -199,7 +199,14 @@ impl Eye<'_> {
     }
 
     fn seen<'b>(&'b self, corners: &'b [Corner]) -> ViewInput<'b> {
-        ViewInput { intrinsics: self.camera, board: self.board, shape: &BoardShape::FLAT, corners, sqrt_weights: &[] }
+        ViewInput {
+            intrinsics: self.camera,
+            board: self.board,
+            shape: &BoardShape::FLAT,
+            corners,
+            sqrt_weights: &[],
+            depths: None,
+        }
     }
 
     /// The mirrored pose, when the corners speak clearly for it.

@@ -6,14 +6,15 @@ use super::VerifyError;
 use crate::estimate::Calibration;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{
-    CornerWeights, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
+    CornerWeights, DepthWeight, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
 };
 use crate::estimate::uncertainty::quality;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{DepthBias, MeasuredDepths, ViewInput};
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::depth_plane::DepthPlane;
 use crate::targets::observation::{Corner, View};
 
 /// What of a calibration is needed to predict.
@@ -47,6 +48,8 @@ pub struct Uncertainty {
     pub noise: Noise,
     /// How corners count against each other, see [`JointFit::weights`](crate::estimate::JointFit::weights).
     pub weights: Option<CornerWeights>,
+    /// The errors of depths and how they count; `None` where the calibration does not count on them.
+    pub depths: Option<(DepthBias, DepthWeight)>,
     /// What was estimated besides the links.
     pub free: Free,
     /// Covariance of everything that predictions share, as in
@@ -66,6 +69,7 @@ impl Predictor {
         let uncertainty = joint.map(|joint| Uncertainty {
             noise: joint.noise,
             weights: joint.weights,
+            depths: joint.depths.as_ref().and_then(|depths| Some((depths.bias, depths.in_fit.weight()?))),
             free: joint.free,
             covariance: joint.covariance.clone(),
         });
@@ -131,14 +135,34 @@ impl Predictor {
         weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(corners))
     }
 
+    /// A view through the calibrated lens, with the whiteners of its corners.
+    pub(super) fn view_input<'a>(
+        &'a self,
+        board: &'a BoardPoints,
+        (corners, depth): (&'a [Corner], Option<&'a DepthPlane>),
+        sqrt_weights: &'a [Matrix2<f64>],
+    ) -> ViewInput<'a> {
+        let counted = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.depths.as_ref());
+        let depths = counted.zip(depth);
+        ViewInput {
+            intrinsics: &self.intrinsics,
+            board,
+            shape: &self.shape,
+            corners,
+            sqrt_weights,
+            depths: depths.map(|((bias, weight), plane)| MeasuredDepths { plane, bias, px_per_m: weight.px_per_m }),
+        }
+    }
+
     /// The board's pose in one image, by its corners and the shape that the calibration found, from its pose as a flat
-    /// board of the stated size. That a board is 2 % larger than stated puts it 2 % farther away.
+    /// board of the stated size; by its depths too, where there are some and the calibration counts on them. That a board is 2 %
+    /// larger than stated puts it 2 % farther away.
     ///
     /// `None` when that puts a corner behind the camera, or a corner is no point of this board.
     pub fn seen(
         &self,
         board: &BoardPoints,
-        corners: &[Corner],
+        (corners, depth): (&[Corner], Option<&DepthPlane>),
         flat: &Pose<Camera, Target>,
     ) -> Option<Pose<Camera, Target>> {
         if corners.iter().any(|corner| corner.index >= board.len()) {
@@ -147,8 +171,6 @@ impl Predictor {
         let mut start = *flat.isometry();
         start.translation.vector *= self.shape.scale;
         let sqrt_weights = self.sqrt_weights(corners);
-        let (intrinsics, shape) = (&self.intrinsics, &self.shape);
-        let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights: &sqrt_weights };
-        quality::weighted_pose_of_view(&seen, &start)
+        quality::weighted_pose_of_view(&self.view_input(board, (corners, depth), &sqrt_weights), &start)
     }
 }

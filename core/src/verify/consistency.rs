@@ -18,7 +18,7 @@ use crate::estimate::handeye::joint::chain::Chain;
 use crate::estimate::handeye::joint::field::{self, SLOPES};
 use crate::estimate::resolution;
 use crate::geometry::se3;
-use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::geometry::view_equations::{FreeParameters, PoseEquations};
 use crate::targets::bent::BoardPoints;
 use crate::targets::observation::View;
 
@@ -108,13 +108,7 @@ impl Sums {
         );
         let seen = check.seen_camera_from_target.isometry();
         let sqrt_weights = calibrated.sqrt_weights(&view.corners);
-        let seen_through = ViewInput {
-            intrinsics: &calibrated.intrinsics,
-            board,
-            shape: &calibrated.shape,
-            corners: &view.corners,
-            sqrt_weights: &sqrt_weights,
-        };
+        let seen_through = calibrated.view_input(board, (&view.corners, view.depth.as_ref()), &sqrt_weights);
         let equations = PoseEquations::new(&seen_through, seen, self.form).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();
         let by_form = pose_covariance * equations.pose_by_form;

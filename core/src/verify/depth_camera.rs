@@ -15,26 +15,19 @@
 //! captures is what the uncertainty is from, by ordinary least squares. A focal length that is off puts the board off by the same
 //! part; its uncertainty is added. A target of another size than stated does the same, and nothing here knows.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Translation3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector5};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
-use super::points;
-use crate::depth::{DepthImage, DepthSample, outlier_reach_m};
+use crate::estimate::DepthsInFit;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::statistics::median_high;
+use crate::geometry::view_equations::{DepthBias, PredictedDepths};
 use crate::targets::TargetSpec;
-use crate::targets::bent::{BoardPoints, BoardShape};
+use crate::targets::bent::BoardShape;
+use crate::targets::depth_plane::{self, DepthPlane};
 
-/// Part of the board that has to be in the image.
-const LEAST_IN_IMAGE: f64 = 0.5;
-/// Part of that which has to have a depth on one plane, for the plane to be that of the board.
-const LEAST_MEASURED: f64 = 0.3;
 /// Captures that tell an offset from a scale and the slope's part, with three to spare for the scatter.
 const FOR_SCALE: usize = 6;
-/// Depths that are off by more than this factor are in another unit, or of another image: the worst depth cameras are off by
-/// some percent.
-const GROSS: f64 = 1.2;
-const ROUNDS: usize = 4;
 /// Chance that an error is called one that is none.
 const FALSE_ALARM: f64 = 1e-3;
 
@@ -85,7 +78,7 @@ pub struct DepthErrors {
 impl DepthReport {
     /// Whether the depths are not of the right order of magnitude.
     pub fn is_gross(&self) -> bool {
-        !(1.0 / GROSS..=GROSS).contains(&self.ratio)
+        !depth_plane::are_of_right_size(self.ratio)
     }
 }
 
@@ -97,10 +90,10 @@ impl DepthErrors {
     }
 }
 
-/// Gathers the depths of captures, one image at a time.
+/// Gathers the depths of captures, one at a time.
 pub struct DepthCheck<'a> {
     lens: &'a Intrinsics,
-    places: Vec<Point3<f64>>,
+    shape: &'a BoardShape,
     middle: Point3<f64>,
     fills: Vec<f64>,
     ratios: Vec<f64>,
@@ -117,67 +110,37 @@ struct Plane {
     variance_m2: f64,
 }
 
-/// A depth of the board.
-struct Sample {
-    expected: Point3<f64>,
-    off_m: f64,
-}
-
 impl<'a> DepthCheck<'a> {
     /// Of a lens, and of the target that the captures show.
-    pub fn new(lens: &'a Intrinsics, target: &TargetSpec, shape: &BoardShape) -> Self {
-        let places = BoardPoints::new(&target.places_all_over()).points(shape);
-        Self { lens, places, middle: target.centre(), fills: Vec::new(), ratios: Vec::new(), planes: Vec::new() }
+    pub fn new(lens: &'a Intrinsics, target: &TargetSpec, shape: &'a BoardShape) -> Self {
+        Self { lens, shape, middle: target.centre(), fills: Vec::new(), ratios: Vec::new(), planes: Vec::new() }
     }
 
-    /// Adds the depths of a capture in which the board is there; `far_m` is the sensor's far plane in metres, infinity when it has
-    /// none. An image of another size than the lens is for, and one without most of the board in it, says nothing.
-    pub fn add(&mut self, depth: &DepthImage, far_m: f32, camera_from_target: &Isometry3<f64>) {
-        let lens = self.lens;
-        if (depth.width, depth.height) != (lens.width, lens.height) {
-            return;
-        }
-        let (mut in_image, mut samples, mut ratios) = (0usize, Vec::new(), Vec::new());
-        for place in &self.places {
-            let Ok(px) = lens.project(&(camera_from_target * place)) else { continue };
-            let within = |value: f64, size: u32| value >= 0.0 && value <= f64::from(size) - 1.0;
-            if !within(px.x, lens.width) || !within(px.y, lens.height) {
-                continue;
-            }
-            // The depth is that of the pixel's middle. There a bent board is a plane as deep in it as the place.
-            let pixel = px.map(f64::round);
-            let surface = camera_from_target * Translation3::new(0.0, 0.0, place.z);
-            let Ok(expected) = points::on_plane(lens, &pixel, &surface) else { continue };
-            in_image += 1;
-            if let DepthSample::Metres(depth_m) = depth.sample(pixel.x as u32, pixel.y as u32, far_m) {
-                let depth_m = f64::from(depth_m);
-                ratios.push(depth_m / expected.z);
-                samples.push(Sample { expected, off_m: depth_m - expected.z });
-            }
-        }
-        if (in_image as f64) < LEAST_IN_IMAGE * self.places.len() as f64 {
-            return;
-        }
-        self.fills.push(samples.len() as f64 / in_image as f64);
-        let Some(ratio) = median_high(ratios) else { return };
-        let least = (LEAST_MEASURED * in_image as f64) as usize;
-        if samples.len() < least {
-            return;
-        }
-        self.ratios.push(ratio);
-        let middle = camera_from_target * self.middle;
-        self.planes.extend(plane(samples, least, middle).map(|mut plane| {
-            // The depth along a ray is z = h / (n · ray).
-            let normal = camera_from_target.rotation * Vector3::z();
-            let towards = normal.xy().norm() / normal.dot(&(middle.coords / middle.z)).abs().max(f64::EPSILON);
-            plane.slope_m = plane.away_m * towards * 2.0 / (lens.fx + lens.fy);
-            plane
-        }));
+    /// Adds the depths of a capture in which the board is there.
+    pub fn add(&mut self, measured: &DepthPlane, camera_from_target: &Isometry3<f64>) {
+        let expected = PredictedDepths::new(self.lens, self.shape, measured, &DepthBias::default(), camera_from_target);
+        self.fills.push(measured.fill);
+        self.ratios.push(measured.depth.x / expected.depth.x);
+        let off = DepthPlane { depth: measured.depth - expected.depth, ..*measured };
+        // Along the board's x and y; the camera's x and y change with these as its axes lie.
+        let rotation = camera_from_target.rotation.to_rotation_matrix().into_inner();
+        let axes = rotation.fixed_view::<2, 2>(0, 0).transpose();
+        let Some(by_camera) = axes.try_inverse().map(|inverse| inverse * off.depth.yz()) else { return };
+        let away_m = (camera_from_target * self.middle).z;
+        self.planes.push(Plane {
+            away_m,
+            slope_m: expected.by_bias[2].x,
+            off_m: off.depth_at(&self.middle),
+            // A turn about x takes what lies at positive y away, one about y brings what lies at positive x nearer.
+            tilt_rad: [by_camera.y, -by_camera.x],
+            variance_m2: measured.scatter_m.powi(2),
+        });
     }
 
     /// What all of them say, with the standard deviation of the focal length \[px\]; `None` without a capture that shows depths of
-    /// the board.
-    pub fn finish(self, sigma_focal_px: f64) -> Option<DepthReport> {
+    /// the board. Where the calibration itself counts on the depths, the captures agree with them: then it is what its estimate has
+    /// them off by (`in_fit`).
+    pub fn finish(self, sigma_focal_px: f64, in_fit: Option<&DepthsInFit>) -> Option<DepthReport> {
         let ratio = median_high(self.ratios.iter().copied())?;
         let fill = self.fills.iter().sum::<f64>() / self.fills.len() as f64;
         let report = DepthReport { captures: self.fills.len(), fill, ratio, errors: None };
@@ -185,52 +148,35 @@ impl<'a> DepthCheck<'a> {
             return Some(report);
         }
         let of_focal = sigma_focal_px * 2.0 / (self.lens.fx + self.lens.fy);
-        Some(DepthReport { errors: errors(&self.planes, of_focal), ..report })
-    }
-}
-
-/// The plane through what depths are off, with those left out that are not on it.
-fn plane(mut samples: Vec<Sample>, least: usize, middle: Point3<f64>) -> Option<Plane> {
-    // The first plane is one of the same height everywhere: what covers the board must not tilt it.
-    let centre = median_high(samples.iter().map(|sample| sample.off_m))?;
-    keep_near(&mut samples, |_| centre);
-    let mut found = None;
-    for _ in 0..ROUNDS {
-        if samples.len() < least.max(4) {
-            return None;
-        }
-        let row = |sample: &Sample| {
-            let aside = sample.expected - middle;
-            Vector3::new(1.0, aside.x, aside.y)
+        let errors = match in_fit.filter(|depths| depths.accepted) {
+            Some(depths) => estimated_with(depths, &self.planes),
+            None => errors(&self.planes, of_focal),
         };
-        let (mut information, mut pull) = (Matrix3::zeros(), Vector3::zeros());
-        for sample in &samples {
-            information += row(sample) * row(sample).transpose();
-            pull += row(sample) * sample.off_m;
-        }
-        let height: Vector3<f64> = information.cholesky()?.solve(&pull);
-        let squares: f64 = samples.iter().map(|sample| (sample.off_m - height.dot(&row(sample))).powi(2)).sum();
-        found = Some(Plane {
-            away_m: middle.z,
-            slope_m: 0.0,
-            off_m: height.x,
-            // A turn about x takes what lies at positive y away, one about y brings what lies at positive x nearer.
-            tilt_rad: [height.z, -height.y],
-            variance_m2: squares / (samples.len() - 3) as f64,
-        });
-        let before = samples.len();
-        keep_near(&mut samples, |sample| height.dot(&row(sample)));
-        if samples.len() == before {
-            break;
-        }
+        Some(DepthReport { errors, ..report })
     }
-    found
 }
 
-fn keep_near(samples: &mut Vec<Sample>, height: impl Fn(&Sample) -> f64) {
-    let off: Vec<f64> = samples.iter().map(|sample| (sample.off_m - height(sample)).abs()).collect();
-    let reach = outlier_reach_m(&off);
-    samples.retain(|sample| (sample.off_m - height(sample)).abs() <= reach);
+/// What a joint estimate has the depths off by.
+fn estimated_with(depths: &DepthsInFit, planes: &[Plane]) -> Option<DepthErrors> {
+    let count = planes.len();
+    let mean = |value: &dyn Fn(&Plane) -> f64| planes.iter().map(value).sum::<f64>() / count as f64;
+    let at_m = mean(&|plane| plane.away_m);
+    let values = Vector5::from(depths.bias.values());
+    let along = |row: Vector5<f64>| Estimated {
+        value: row.dot(&values),
+        sigma: row.dot(&(depths.covariance * row)).max(0.0).sqrt(),
+    };
+    let of = |k: usize| along(Vector5::ith(k, 1.0));
+    Some(DepthErrors {
+        offset_m: along(Vector5::new(1.0, at_m, 0.0, 0.0, 0.0)),
+        at_m,
+        scale: Some(of(1)),
+        slope_px: Some(of(2)),
+        tilt_rad: [of(3), of(4)],
+        noise_m: mean(&|plane| plane.variance_m2).sqrt(),
+        between_m: depths.noise_m,
+        degrees_of_freedom: (3 * depths.views).checked_sub(DepthBias::COUNT)?,
+    })
 }
 
 fn errors(planes: &[Plane], of_focal: f64) -> Option<DepthErrors> {

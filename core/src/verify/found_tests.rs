@@ -23,7 +23,7 @@ const OFFSETS_DEG: [f64; 6] = [0.0, 0.2, -0.15, 0.1, -0.2, 0.0];
 const EXACT: Noise = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
 
 fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
-    let captures: Vec<_> = views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
+    let captures: Vec<_> = views.iter().collect();
     verify(calibrated, &BOARD, &captures, &CancelToken::default()).expect("verifies")
 }
 
@@ -69,7 +69,7 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
         // A pixel on a corner is the corner, half a metre away.
         let (view, board) = (&t.views[0], BoardPoints::new(&t.points));
         let flat = planar_pose::camera_from_target(&view.corners, &BOARD, &t.intrinsics).expect("a pose");
-        let seen = exact.seen(&board, &view.corners, &flat).expect("in front of the camera");
+        let seen = exact.seen(&board, (&view.corners, None), &flat).expect("in front of the camera");
         let centre = BOARD.centre();
         let nearer = seen.isometry() * (centre * SCALE) - flat.isometry() * centre;
         println!("{mode:?}: as a board of the stated size it would be {:.1} mm nearer", nearer.norm() * 1e3);
@@ -135,7 +135,7 @@ fn a_capture_whose_joints_are_unknown_is_not_verified_as_if_they_were_right() {
     let calibrated = Predictor::new(&calibration).expect("complete");
     assert_eq!(calibrated.joint_offsets_rad.len(), 6);
     views[1].tip_by_joint.clear();
-    let captures: Vec<_> = views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
+    let captures: Vec<_> = views.iter().collect();
     let result = verify(&calibrated, &BOARD, &captures, &CancelToken::default());
     assert_eq!(result, Err(VerifyError::NoJoints { name: "1".to_owned() }));
 }

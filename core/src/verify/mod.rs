@@ -10,18 +10,18 @@ mod consistency;
 mod depth_camera;
 mod points;
 
-use nalgebra::{Point3, Translation3, Vector3};
+use nalgebra::{Point3, Vector3};
 
-use crate::depth::{DepthImage, DepthSample};
 use crate::estimate::CornerResidual;
 use crate::geometry::camera::CameraError;
 use crate::geometry::frames::{Anchor, Base, Camera, Pose, Target, Tip};
 use crate::geometry::planar_pose::{self, PoseError};
 use crate::geometry::se3;
-use crate::geometry::statistics::median_high;
+use crate::geometry::view_equations::{DepthBias, PredictedDepths};
 use crate::progress::{Stage, Work};
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardPoints;
+use crate::targets::depth_plane::DepthPlane;
 use crate::targets::observation::{Corner, View};
 
 pub use calibrated::{Predictor, Uncertainty};
@@ -98,17 +98,6 @@ pub enum VerifyError {
     Cancelled,
 }
 
-/// A capture to verify with.
-#[derive(Debug, Clone, Copy)]
-pub struct CheckCapture<'a> {
-    /// Reported robot pose and corners; it must not have been in the fit.
-    pub view: &'a View,
-    /// The depth image taken with it, of the same camera.
-    pub depth: Option<&'a DepthImage>,
-    /// Far plane of the depth sensor in metres, infinity when it has none.
-    pub far_m: f32,
-}
-
 /// What one capture says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaptureCheck {
@@ -122,7 +111,8 @@ pub struct CaptureCheck {
     pub residuals: Vec<CornerResidual>,
     /// The board as predicted.
     pub predicted_camera_from_target: Pose<Camera, Target>,
-    /// The board as seen: its pose from the corners alone, of the shape that the calibration found.
+    /// The board as seen: its pose from the corners, and from the depths where the calibration counts on them, of the shape that
+    /// the calibration found.
     pub seen_camera_from_target: Pose<Camera, Target>,
     /// Middle of the board as seen minus as predicted, in camera axes, metres.
     pub centre_error_m: Vector3<f64>,
@@ -130,8 +120,8 @@ pub struct CaptureCheck {
     pub orientation_error_rad: f64,
     /// Origin of the board as seen minus as predicted, in base axes, metres.
     pub origin_error_in_base_m: Vector3<f64>,
-    /// Median over the corners of measured depth minus the depth at which the predicted board is, metres; `None` without
-    /// depth image or without a measurement at any corner.
+    /// Measured depth minus that of the predicted board where its corners are on average, metres; `None` without depths of the
+    /// board's plane.
     pub depth_error_m: Option<f64>,
     /// Squared error of the board's pose over what the stated uncertainty expects, per degree of freedom: 1 on average,
     /// above 2.8 in one of a hundred captures. `None` when no uncertainty is stated.
@@ -165,7 +155,7 @@ impl Verification {
     }
 }
 
-/// Checks a calibration with captures that were never in its fit. `work` is a `&CancelToken`, or a [`Work`] to follow the
+/// Checks a calibration with captures, robot pose and sight of the board, that were never in its fit. `work` is a `&CancelToken`, or a [`Work`] to follow the
 /// progress.
 ///
 /// # Needs
@@ -176,7 +166,7 @@ impl Verification {
 pub fn verify<'a>(
     calibrated: &Predictor,
     target: &TargetSpec,
-    captures: &[CheckCapture<'_>],
+    captures: &[&View],
     work: impl Into<Work<'a>>,
 ) -> Result<Verification, VerifyError> {
     let work = work.into();
@@ -187,14 +177,14 @@ pub fn verify<'a>(
     let mut consistency = calibrated.uncertainty.as_ref().and_then(|it| consistency::Sums::new(calibrated, it));
     let mut checks = Vec::with_capacity(captures.len());
     let mut tips = Vec::with_capacity(captures.len());
-    for (done, capture) in captures.iter().enumerate() {
+    for (done, view) in captures.iter().copied().enumerate() {
         if work.is_cancelled() {
             return Err(VerifyError::Cancelled);
         }
         work.report(Stage::Verification, done, captures.len());
-        let base_from_tip = calibrated.base_from_tip(capture.view)?;
-        let mut check = check(calibrated, target, &board, capture, &base_from_tip)?;
-        check.ratio = consistency.as_mut().and_then(|sums| sums.add(calibrated, &board, capture.view, &check));
+        let base_from_tip = calibrated.base_from_tip(view)?;
+        let mut check = check(calibrated, target, &board, view, &base_from_tip)?;
+        check.ratio = consistency.as_mut().and_then(|sums| sums.add(calibrated, &board, view, &check));
         checks.push(check);
         tips.push(base_from_tip);
     }
@@ -205,10 +195,9 @@ fn check(
     calibrated: &Predictor,
     target: &TargetSpec,
     board: &BoardPoints,
-    capture: &CheckCapture<'_>,
+    view: &View,
     base_from_tip: &Pose<Base, Tip>,
 ) -> Result<CaptureCheck, VerifyError> {
-    let view = capture.view;
     let name = || view.name.clone();
     let no_pose = |source| VerifyError::NoPose { name: name(), source };
     // This checks the corners, so every index below is a point of the target.
@@ -216,7 +205,7 @@ fn check(
     let predicted = calibrated.camera_from_target(base_from_tip);
     let flat = poses.nearer_to(&predicted, view.corners.len()).camera_from_target;
     let seen = calibrated
-        .seen(board, &view.corners, &flat)
+        .seen(board, (&view.corners, view.depth.as_ref()), &flat)
         .ok_or_else(|| no_pose(PoseError::NoPose { corners: view.corners.len() }))?;
     let points = board.points(&calibrated.shape);
     let residuals_at = |camera_from_target: &Pose<Camera, Target>| -> Result<Vec<CornerResidual>, CameraError> {
@@ -236,7 +225,7 @@ fn check(
         centre_error_m: seen.isometry() * centre - predicted.isometry() * centre,
         orientation_error_rad: se3::rotation_vector(&(predicted.inverse() * seen).rotation()).norm(),
         origin_error_in_base_m: calibrated.base_from_camera(base_from_tip).rotation() * origin_error,
-        depth_error_m: depth_error_m(calibrated, capture, &predicted, &points),
+        depth_error_m: view.depth.as_ref().map(|plane| depth_error_m(calibrated, plane, &predicted)),
         residuals,
         predicted_camera_from_target: predicted,
         seen_camera_from_target: seen,
@@ -244,30 +233,11 @@ fn check(
     })
 }
 
-/// Median over the corners, so that a corner at an edge of the surface does not decide.
-fn depth_error_m(
-    calibrated: &Predictor,
-    capture: &CheckCapture<'_>,
-    predicted: &Pose<Camera, Target>,
-    points: &[Point3<f64>],
-) -> Option<f64> {
-    let image = capture.depth?;
-    let mut errors: Vec<f64> = Vec::new();
-    for corner in &capture.view.corners {
-        let (column, row) = (corner.px.x.round(), corner.px.y.round());
-        if column < 0.0 || row < 0.0 {
-            continue;
-        }
-        let DepthSample::Metres(depth) = image.sample(column as u32, row as u32, capture.far_m) else { continue };
-        // The depth is that of the pixel's middle, not of the corner.
-        let pixel = nalgebra::Vector2::new(column, row);
-        // Around a corner a bent board is a plane as deep in it as the corner.
-        let surface = predicted.isometry() * Translation3::new(0.0, 0.0, points[corner.index].z);
-        if let Ok(on_board) = points::on_plane(&calibrated.intrinsics, &pixel, &surface) {
-            errors.push(f64::from(depth) - on_board.z);
-        }
-    }
-    median_high(errors)
+/// Of the predicted board.
+fn depth_error_m(calibrated: &Predictor, plane: &DepthPlane, predicted: &Pose<Camera, Target>) -> f64 {
+    let (lens, shape) = (&calibrated.intrinsics, &calibrated.shape);
+    let expected = PredictedDepths::new(lens, shape, plane, &DepthBias::default(), predicted.isometry());
+    plane.depth.x - expected.depth.x
 }
 
 fn rms(squares: impl ExactSizeIterator<Item = f64>) -> f64 {

@@ -2,6 +2,7 @@ use nalgebra::{Isometry3, Matrix2, Vector2, Vector6};
 use rand::SeedableRng as _;
 
 use super::*;
+use crate::depth::DepthImage;
 use crate::estimate::handeye::joint::{Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::estimate::{Method, calibrate};
@@ -17,8 +18,8 @@ fn calibrated(t: &Trial, views: usize, free_intrinsics: bool) -> Predictor {
     Predictor::new(&calibration).expect("complete")
 }
 
-fn captures(views: &[View]) -> Vec<CheckCapture<'_>> {
-    views.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect()
+fn captures(views: &[View]) -> Vec<&View> {
+    views.iter().collect()
 }
 
 fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
@@ -203,14 +204,12 @@ fn a_depth_image_that_is_off_by_a_millimetre_says_so() {
         }
     }
     let depth = DepthImage::new(640, 480, metres).expect("full");
-    let capture = CheckCapture { view, depth: Some(&depth), far_m: 3.5 };
-    let v = verify(&truth, &BOARD, &[capture], &CancelToken::default()).expect("verifies");
+    let measured = View { depth: DepthPlane::new(&depth, (640, 480), &view.corners, &BOARD), ..view.clone() };
+    let v = verify(&truth, &BOARD, &[&measured], &CancelToken::default()).expect("verifies");
     // Single precision at half a metre: 3e-8 m.
     assert!((v.captures[0].depth_error_m.expect("measured") - 0.001).abs() < 1e-6);
     assert_eq!(v.origin_scatter_m, None, "one capture has no scatter");
-    let nothing = DepthImage::new(640, 480, vec![f32::NAN; 640 * 480]).expect("full");
-    let capture = CheckCapture { view, depth: Some(&nothing), far_m: 3.5 };
-    let v = verify(&truth, &BOARD, &[capture], &CancelToken::default()).expect("verifies");
+    let v = verify(&truth, &BOARD, &[view], &CancelToken::default()).expect("verifies");
     assert_eq!(v.captures[0].depth_error_m, None);
 }
 

@@ -11,7 +11,7 @@ use handeye_core::plan::guided::{Ending, Guide, Known, LEAST_VIEWS, Next};
 use handeye_core::progress::CancelToken;
 use handeye_core::project::session::CaptureId;
 use handeye_core::project::taught_poses::Goal;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::Sight;
 use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::super::Failure;
@@ -36,7 +36,7 @@ pub struct GuidedSequence<'a, 's> {
     /// Where to go if the board is not in view from where the arm stands, one after the other.
     pub towards_board: Vec<TowardsBoard>,
     /// What was found in the captures.
-    corners: BTreeMap<CaptureId, Vec<Corner>>,
+    sights: BTreeMap<CaptureId, Sight>,
     image_size: (u32, u32),
     /// Captures and tries so far.
     number: u64,
@@ -61,7 +61,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
             around,
             checks,
             towards_board,
-            corners: BTreeMap::new(),
+            sights: BTreeMap::new(),
             image_size: (0, 0),
             number: 0,
             time_s: None,
@@ -158,7 +158,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         };
         let Some((id, measured)) = self.sequence.visit(self.number, &name, goal, purpose)? else { return Ok(false) };
         self.image_size = measured.rgb.dimensions();
-        self.corners.insert(id, measured.corners.clone());
+        self.sights.insert(id, Sight { corners: measured.corners.clone(), depth: measured.depth_plane });
         let first_s = self.time_s.map_or(measured.sim_time_s, |[first, _]| first);
         self.time_s = Some([first_s, measured.sim_time_s]);
         tracing::info!("captured ({name})");
@@ -168,7 +168,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     /// What the captures give, with what speaks against it where there are enough to end.
     fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
         let document = self.sequence.session.document();
-        let observations = document.observations(self.image_size, |id| self.corners.get(&id).cloned()).observations;
+        let observations = document.observations(self.image_size, |id| self.sights.get(&id).cloned()).observations;
         let cancel: &CancelToken = self.sequence.cancel;
         let mut calibration = calibrate(&observations, Method::Joint, cancel).ok();
         if observations.views.len() >= LEAST_VIEWS {

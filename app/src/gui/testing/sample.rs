@@ -17,7 +17,7 @@ use handeye_core::project::export::{self, ExportInput};
 use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_core::targets::observation::{Corner, View};
 use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
-use handeye_core::verify::{self, CheckCapture, Predictor};
+use handeye_core::verify::{self, Predictor};
 use handeye_sim_link::client::cell::ArmKinematics;
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
@@ -190,7 +190,8 @@ pub fn captured() -> Model {
     document.captures = (1..=FITTED + VERIFYING).map(record).collect();
     for n in 1..=FITTED + VERIFYING {
         let thumbnail = RgbImage::from_fn(160, 120, |column, row| Rgb([column as u8, row as u8, (20 * n) as u8]));
-        let observed = Observed { corners: Some(corners(n)), image_size: (640, 480), thumbnail: Arc::new(thumbnail) };
+        let observed =
+            Observed { corners: Some(corners(n)), depth: None, image_size: (640, 480), thumbnail: Arc::new(thumbnail) };
         model.observed.insert(CaptureId(n), Some(Arc::new(observed)));
     }
     let folder = Some(PathBuf::from("sessions/sample"));
@@ -234,8 +235,7 @@ pub fn solved() -> Model {
     let calibrated = Predictor::new(&calibration).expect("a hand-eye");
     let checks: Vec<View> =
         (FITTED + 1..=FITTED + VERIFYING).map(|n| View::new(record(n).image, base_from_tip(n), corners(n))).collect();
-    let captures: Vec<CheckCapture<'_>> =
-        checks.iter().map(|view| CheckCapture { view, depth: None, far_m: f32::INFINITY }).collect();
+    let captures: Vec<&View> = checks.iter().collect();
     let verification = verify::verify(&calibrated, &BOARD, &captures, &cancel);
     model.solve.solved = Some(Arc::new(Solved {
         job: JobId(1),

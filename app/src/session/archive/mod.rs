@@ -242,6 +242,7 @@ impl Archive {
             Ok(id) => {
                 let observed = Observed {
                     corners: Some(measured.corners.clone()),
+                    depth: measured.depth_plane,
                     image_size: measured.rgb.dimensions(),
                     thumbnail: Arc::new(measured.thumbnail.clone()),
                 };

@@ -199,7 +199,7 @@ impl SessionViews {
         }
         self.intrinsics = Some(camera);
         let points = BoardPoints::new(&observations.target.points());
-        let free = FreeParameters { lens: true, warp: true, scale: false };
+        let free = FreeParameters { lens: true, warp: true, ..FreeParameters::default() };
         let count = free.count(&camera);
         let variances = fits.iter().flatten().map(Fit::variance_px2);
         let Some(typical) = median(variances) else {
@@ -218,6 +218,7 @@ impl SessionViews {
                 shape: &BoardShape::FLAT,
                 corners: &fit.corners,
                 sqrt_weights: &[],
+                depths: None,
             };
             let Ok(equations) = PoseEquations::new(&seen, &pose, free) else { continue };
             let Some(inverse) = equations.pose.try_inverse() else { continue };

@@ -69,8 +69,8 @@ fn off(errors: &DepthErrors) -> Finding {
         parts.push(text!("turned by {x}° and {y}° about the camera's x and y", x = signed(x, 2), y = signed(y, 2)));
     }
     let text = text!(
-        "The depth camera does not agree with the calibrated lens: its depths of the target are off by {parts}. The answer does not \
-         depend on them, but points that are taken by depth are off by as much: correct the depths by these numbers, or calibrate \
+        "The depth camera does not agree with the calibrated lens: its depths of the target are off by {parts}. The answer allows for \
+         that, but points that are taken by depth are off by as much: correct the depths by these numbers, or calibrate \
          the depth camera.",
         parts = Text::list(parts.into_iter())
     );

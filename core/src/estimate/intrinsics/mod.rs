@@ -179,7 +179,7 @@ pub fn solve(
     if spread_deg < MIN_SPREAD_DEG {
         return Err(IntrinsicsError::ParallelViews { views: views.len(), spread_deg });
     }
-    let lens = FreeParameters { lens: true, warp: false, scale: false };
+    let lens = FreeParameters { lens: true, ..FreeParameters::default() };
     let bent = FreeParameters { warp: true, ..lens };
     let free = if options.bend == Bend::Always { bent } else { lens };
     let mut problem = Problem { views, board, free, cancel };

@@ -98,7 +98,7 @@ fn wrong(views: &[&[Corner]], board: &BoardPoints, found: &Found) -> Vec<Vec<usi
                 return Vec::new();
             }
             let (intrinsics, shape, sqrt_weights) = (&found.intrinsics, &found.shape, &[][..]);
-            let seen = ViewInput { intrinsics, board, shape, corners: &trusted, sqrt_weights };
+            let seen = ViewInput { intrinsics, board, shape, corners: &trusted, sqrt_weights, depths: None };
             let Some(next) = refine(&seen, &pose, POSE_STEPS) else { break };
             pose = next.pose;
         }

@@ -113,7 +113,7 @@ fn what_a_bend_would_do_is_known_without_a_fit_that_has_it() {
     let bent = solved(&views, &Options { bend: Bend::Always, ..Options::new(BROWN) }).expect("bent");
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
     let (board, cancel) = (board(), CancelToken::default());
-    let free = FreeParameters { lens: true, warp: false, scale: false };
+    let free = FreeParameters { lens: true, ..FreeParameters::default() };
     let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
     let poses: Vec<Isometry3<f64>> = flat.camera_from_target.iter().map(|p| *p.isometry()).collect();
     let estimate = Estimate { intrinsics: flat.intrinsics, shape: flat.shape, poses, mirrored: Vec::new() };
@@ -193,7 +193,7 @@ fn a_pose_that_began_as_its_mirror_image_is_turned_round() {
     let found = solved(&views, &Options::new(Distortion::None)).expect("solves");
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
     let (board, cancel) = (board(), CancelToken::default());
-    let free = FreeParameters { lens: true, warp: false, scale: false };
+    let free = FreeParameters { lens: true, ..FreeParameters::default() };
     let problem = Problem { views: &seen, board: &board, free, cancel: &cancel };
     let poses: Vec<Isometry3<f64>> = found.camera_from_target.iter().map(|p| *p.isometry()).collect();
     let (intrinsics, shape) = (found.intrinsics, found.shape);

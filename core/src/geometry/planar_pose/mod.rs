@@ -201,7 +201,8 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
     intrinsics.validate()?;
     check_corners(corners, target, 0)?;
     let board = BoardPoints::new(&target.points());
-    let seen = ViewInput { intrinsics, board: &board, shape: &BoardShape::FLAT, corners, sqrt_weights: &[] };
+    let seen =
+        ViewInput { intrinsics, board: &board, shape: &BoardShape::FLAT, corners, sqrt_weights: &[], depths: None };
     let pairs = corners.iter().filter_map(|corner| start::pair(&seen, corner).transpose());
     let mut solutions: Vec<Solution> = start::starts(&pairs.collect::<Result<Vec<_>, _>>()?)
         .iter()

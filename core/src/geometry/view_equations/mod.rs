@@ -1,5 +1,6 @@
 //! The least-squares equations of one view in the target's pose, the lens and the shape of the target.
 
+mod depths;
 mod gram;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix2, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
@@ -9,21 +10,25 @@ use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
 use gram::{Gram, Products};
 
+pub use depths::DepthBias;
+pub(crate) use depths::{MeasuredDepths, PredictedDepths};
+
 pub(crate) use gram::Pair;
 
 /// Unknowns of a pose.
 pub(crate) const POSE: usize = 6;
 
 /// Most unknowns of lens and target shape.
-pub(crate) const MAX_FORM: usize = MAX_PARAMETERS + 3;
+pub(crate) const MAX_FORM: usize = MAX_PARAMETERS + 3 + DepthBias::COUNT;
 
 /// Which unknowns of lens and target shape are free. Their columns are, without gaps, the lens parameters in the order of
-/// [`Intrinsics::parameters`], the two warps, and the scale.
+/// [`Intrinsics::parameters`], the two warps, the scale, and the errors of a depth camera ([`DepthBias`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FreeParameters {
     pub lens: bool,
     pub warp: bool,
     pub scale: bool,
+    pub depth: bool,
 }
 
 impl FreeParameters {
@@ -41,9 +46,14 @@ impl FreeParameters {
         self.warp_at(intrinsics) + if self.warp { 2 } else { 0 }
     }
 
+    /// First column of the depth camera's errors.
+    pub fn depth_at(self, intrinsics: &Intrinsics) -> usize {
+        self.scale_at(intrinsics) + usize::from(self.scale)
+    }
+
     /// Number of columns.
     pub fn count(self, intrinsics: &Intrinsics) -> usize {
-        self.scale_at(intrinsics) + usize::from(self.scale)
+        self.depth_at(intrinsics) + if self.depth { DepthBias::COUNT } else { 0 }
     }
 }
 
@@ -56,6 +66,8 @@ pub(crate) struct ViewInput<'a> {
     pub corners: &'a [Corner],
     /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
     pub sqrt_weights: &'a [Matrix2<f64>],
+    /// What depths say of the target's pose, beside the corners; `None` where they do not count.
+    pub depths: Option<MeasuredDepths<'a>>,
 }
 
 /// Normal equations of one view, with residuals `r = predicted − measured` in pixels (times the whitener of the corner)
@@ -76,6 +88,8 @@ pub(crate) struct PoseEquations {
     pub squared_px: f64,
     /// Number of corners.
     pub corners: usize,
+    /// Number of residuals of depths.
+    pub depths: usize,
 }
 
 impl PoseEquations {
@@ -91,7 +105,8 @@ impl PoseEquations {
             3 => Self::with_quads::<3>(seen, camera_from_target, free),
             4 => Self::with_quads::<4>(seen, camera_from_target, free),
             5 => Self::with_quads::<5>(seen, camera_from_target, free),
-            _ => Self::with_quads::<6>(seen, camera_from_target, free),
+            6 => Self::with_quads::<6>(seen, camera_from_target, free),
+            _ => Self::with_quads::<7>(seen, camera_from_target, free),
         }
     }
 
@@ -105,7 +120,11 @@ impl PoseEquations {
         for (i, corner) in seen.corners.iter().enumerate() {
             rows.fill(i, corner, gram.next())?;
         }
-        Ok(Self::from_products(&gram.finish(), rows.count, seen.corners.len()))
+        let mut equations = Self::from_products(&gram.finish(), rows.count, seen.corners.len());
+        if let Some(depths) = &seen.depths {
+            depths.add_to(&mut equations, seen, camera_from_target, free);
+        }
+        Ok(equations)
     }
 
     fn from_products<const QUADS: usize>(products: &Products<'_, QUADS>, count: usize, corners: usize) -> Self {
@@ -118,6 +137,7 @@ impl PoseEquations {
             form_gradient: DVector::from_fn(count, |i, _| products.at(POSE + i, residual)),
             squared_px: products.at(residual, residual),
             corners,
+            depths: 0,
         }
     }
 }
@@ -178,6 +198,10 @@ impl<'a> Rows<'a> {
                 columns[POSE + free.scale_at(intrinsics)] =
                     [0, 1].map(|row| bx[row] * by_scale.x + by[row] * by_scale.y + bz[row] * by_scale.z);
             }
+        }
+        if free.depth {
+            let at = POSE + free.depth_at(intrinsics);
+            columns[at..at + DepthBias::COUNT].fill([0.0; 2]);
         }
         columns[POSE + count] = [projection.px[0] - corner.px.x, projection.px[1] - corner.px.y];
         if let Some(w) = sqrt_weights.get(i) {

@@ -76,7 +76,7 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
             (false, true, false, true),
         ] {
             let view = view(distortion, weighted);
-            let free = FreeParameters { lens, warp, scale };
+            let free = FreeParameters { lens, warp, scale, depth: false };
             let n = 6 + free.count(&view.intrinsics);
             let zero = vec![0.0; n];
             let r = residuals(&view, free, &zero);
@@ -93,7 +93,7 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
             let jacobian = DMatrix::from_columns(&columns);
             let (normal, gradient) = (jacobian.transpose() * &jacobian, jacobian.transpose() * &r);
             let View { intrinsics, board, shape, corners, sqrt_weights, pose } = &view;
-            let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights };
+            let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights, depths: None };
             let found = PoseEquations::new(&seen, pose, free).expect("in front");
             assert_eq!(found.corners, 20);
             assert!((found.squared_px / r.norm_squared() - 1.0).abs() < 1e-12);
@@ -122,7 +122,7 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
 fn a_target_behind_the_camera_has_no_equations() {
     let view = view(LENSES[1], false);
     let View { intrinsics, board, shape, corners, sqrt_weights, .. } = &view;
-    let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights };
+    let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights, depths: None };
     let behind = Isometry3::translation(0.0, 0.0, -1.0);
     assert!(PoseEquations::new(&seen, &behind, FreeParameters { lens: true, ..FreeParameters::default() }).is_err());
 }

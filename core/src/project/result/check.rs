@@ -175,6 +175,11 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
             require(mm.len() == x_mm.len(), key, "must have a number for each point of the target")?;
         }
     }
+    if let Some(depths) = &estimate.depths {
+        not_negative(Some(depths.noise_mm), "estimate.depths.noise_mm")?;
+        let probability = depths.other_probability;
+        require((0.0..=1.0).contains(&probability), "estimate.depths.other_probability", "must be a probability")?;
+    }
     if let Some(distortion) = &estimate.residual_distortion {
         let ResidualDistortionEstimate { degree, x_px, y_px, .. } = distortion;
         require(*degree <= MOST_DEGREES, "estimate.residual_distortion.degree", "is more than any image shows")?;

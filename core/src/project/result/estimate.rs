@@ -42,6 +42,9 @@ pub struct EstimateDetails {
     /// What the points of the target are off their drawing, where the data show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub print: Option<PrintEstimate>,
+    /// The depths of the captures in the estimate, where enough were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depths: Option<DepthsEstimate>,
     /// What the lens does beyond its model, where the data show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residual_distortion: Option<ResidualDistortionEstimate>,
@@ -104,6 +107,25 @@ impl PrintEstimate {
     pub fn errors_m(&self) -> Vec<Vector2<f64>> {
         self.x_mm.iter().zip(&self.y_mm).map(|(x, y)| Vector2::new(*x, *y) * 1e-3).collect()
     }
+}
+
+/// What was tried with the depths of the captures: the errors of the depth camera are in the result's `depth`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DepthsEstimate {
+    /// Captures with depths of the target.
+    pub captures: usize,
+    /// Noise of depths that all those of a capture have in common, one standard deviation, millimetres.
+    pub noise_mm: f64,
+    /// Whether the answer leaves it open how far the depth camera is turned against the lens, and does not take it for straight.
+    pub turned: bool,
+    /// Probability that it is the other way.
+    pub other_probability: f64,
+    /// Error on held-out views without the depths, pixels.
+    pub heldout_before_px: f64,
+    /// And with them, pixels.
+    pub heldout_after_px: f64,
+    /// Whether the answer uses them.
+    pub accepted: bool,
 }
 
 /// The joints as found.

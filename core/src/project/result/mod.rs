@@ -23,8 +23,8 @@ use crate::verify::DepthReport;
 
 pub use check::BadResult;
 pub use estimate::{
-    BoardEstimate, EstimateDetails, Findings, JointOffsetsEstimate, PrintEstimate, ResidualDistortionEstimate,
-    RobotFieldEstimate, TargetSizeEstimate, WideningRecord,
+    BoardEstimate, DepthsEstimate, EstimateDetails, Findings, JointOffsetsEstimate, PrintEstimate,
+    ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate, WideningRecord,
 };
 pub use file::{ResultError, ResultProblem};
 pub use of_calibration::{TARGET_OPTION, solve_options};

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix3;
 
 use super::{
-    BoardEstimate, CalibrationResult, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate, MethodRecord,
-    PrintEstimate, Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate, ViewRecord,
-    ViewRecordStatus, WideningRecord,
+    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate,
+    MethodRecord, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate,
+    TargetSizeEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
 };
 use crate::estimate::handeye::joint::{PrintErrors, RobotField, ShownDistortion};
 use crate::estimate::uncertainty::widening::Evidence;
 use crate::estimate::{
-    Calibration, CameraFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
+    Calibration, CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
 };
 use crate::targets::TargetSpec;
 
@@ -101,8 +101,21 @@ impl Calibration {
             }),
             robot_field: joint.field.as_ref().map(|field| robot_field(field, joint)),
             print: joint.print.as_ref().map(print),
+            depths: joint.depths.as_ref().map(|depths| depths_estimate(&depths.in_fit)),
             residual_distortion: joint.residual_distortion.as_ref().map(residual_distortion),
         }
+    }
+}
+
+fn depths_estimate(depths: &DepthsInFit) -> DepthsEstimate {
+    DepthsEstimate {
+        captures: depths.views,
+        noise_mm: depths.noise_m * 1e3,
+        turned: depths.turned,
+        other_probability: depths.other_probability,
+        heldout_before_px: depths.heldout_before_px,
+        heldout_after_px: depths.heldout_after_px,
+        accepted: depths.accepted,
     }
 }
 

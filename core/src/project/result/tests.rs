@@ -76,6 +76,15 @@ pub(crate) fn golden() -> CalibrationResult {
             typical_deg: 0.03,
             heldout_rms_px: Some(0.6),
         }),
+        depths: Some(DepthsEstimate {
+            captures: 12,
+            noise_mm: 0.02,
+            turned: false,
+            other_probability: 0.01,
+            heldout_before_px: 0.11,
+            heldout_after_px: 0.1,
+            accepted: true,
+        }),
         print: Some(PrintEstimate {
             rms_mm: 0.05,
             x_mm: vec![0.05, -0.05],

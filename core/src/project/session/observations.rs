@@ -9,7 +9,7 @@ use super::document::{Document, Role};
 use crate::estimate::{Observations, ObservedView};
 use crate::geometry::arm::ArmError;
 use crate::project::dataset::CameraInput;
-use crate::targets::observation::{Corner, View};
+use crate::targets::observation::{Sight, View};
 
 /// What was observed in a session.
 #[derive(Debug, Clone)]
@@ -24,7 +24,7 @@ pub struct SessionObservations {
 }
 
 impl Document {
-    /// What was observed in the captures. `corners` gives those of a capture, `None` when the target was not found in it;
+    /// What was observed in the captures. `sights` gives what the image of a capture shows, `None` when the target was not found in it;
     /// `image_size` is width and height of the images in pixels.
     ///
     /// Joint angles are used where they belong to the poses, see [`Document::tip_by_joint`]; otherwise a line in the log
@@ -32,7 +32,7 @@ impl Document {
     pub fn observations(
         &self,
         image_size: (u32, u32),
-        corners: impl Fn(CaptureId) -> Option<Vec<Corner>>,
+        sights: impl Fn(CaptureId) -> Option<Sight>,
     ) -> SessionObservations {
         let mut tip_by_joint = self.tip_by_joint_or_none();
         let mut seen = SessionObservations {
@@ -47,22 +47,25 @@ impl Document {
             verification: Vec::new(),
         };
         for capture in &self.captures {
-            let corners = corners(capture.id);
+            let sight = sights(capture.id);
             let tip_by_joint = tip_by_joint.remove(&capture.id).unwrap_or_default();
-            match (capture.role, corners) {
-                (Role::Calibration, corners) => {
+            match (capture.role, sight) {
+                (Role::Calibration, sight) => {
+                    let depth = sight.as_ref().and_then(|sight| sight.depth);
+                    let corners = sight.map(|sight| sight.corners);
                     seen.captures.push(capture.id);
                     seen.observations.views.push(ObservedView {
                         tip_by_joint,
+                        depth,
                         in_fit: capture.is_in_use(),
                         ..ObservedView::new(&capture.image, capture.base_from_tip, corners)
                     });
                 }
-                (Role::Verification, Some(corners)) if !capture.excluded => {
+                (Role::Verification, Some(Sight { corners, depth })) if !capture.excluded => {
                     // A camera by itself is not verified.
                     let Some(base_from_tip) = capture.base_from_tip else { continue };
                     let view = View::new(capture.image.clone(), base_from_tip, corners);
-                    seen.verification.push((capture.id, View { tip_by_joint, ..view }));
+                    seen.verification.push((capture.id, View { tip_by_joint, depth, ..view }));
                 }
                 (Role::Verification, _) => {}
             }

@@ -3,6 +3,7 @@ use nalgebra::Vector2;
 use super::*;
 use crate::project::session::tests::{meta, record};
 use crate::project::session::{CaptureRecord, Role};
+use crate::targets::observation::Corner;
 
 /// A corner that tells from which capture it is.
 fn corner_of(id: CaptureId) -> Vec<Corner> {
@@ -24,7 +25,8 @@ fn exclusions_and_verification_captures_are_known_by_their_number_wherever_they_
     ];
     let document = Document { captures, ..Document::new(meta()) };
     let unseen = CaptureId(3);
-    let seen = document.observations((24, 16), |id| (id != unseen).then(|| corner_of(id)));
+    let seen =
+        document.observations((24, 16), |id| (id != unseen).then(|| Sight { corners: corner_of(id), depth: None }));
 
     let ids = |ids: &[CaptureId]| ids.iter().map(|id| id.0).collect::<Vec<_>>();
     assert_eq!(ids(&seen.captures), [9, 2, 1, 8]);

@@ -53,7 +53,7 @@ impl ViewModel {
     pub fn new(calibration: &Calibration, target: &TargetSpec) -> Option<Self> {
         let joint = calibration.joint.as_ref()?;
         let intrinsics = calibration.intrinsics()?;
-        let free = Free { joints: false, ..joint.free };
+        let free = Free { joints: false, depth: false, ..joint.free };
         let field = joint.field.clone();
         let layout =
             Layout { form: free.form().count(&intrinsics), joints: 0, field: field.as_ref().map_or(0, |_| SLOPES) };
@@ -145,6 +145,7 @@ impl ViewModel {
             shape: &self.shape,
             corners: &corners,
             sqrt_weights: &[],
+            depths: None,
         };
         let equations = PoseEquations::new(&seen, &chain.camera_from_target, self.free.form()).ok()?;
         let place = self.field.as_ref().map(|field| field.place(base_from_tip));

@@ -47,12 +47,13 @@ pub(crate) mod state;
 mod variance;
 pub(crate) mod view_block;
 mod weights;
+pub(crate) mod with_depths;
 
 use std::sync::Arc;
 
 use nalgebra::Point3;
 pub use print_errors::PrintErrors;
-pub use problem::{Free, JointProblem, JointStart, LensPrior, Noise};
+pub use problem::{DepthWeight, Free, JointProblem, JointStart, LensPrior, Noise};
 pub use residual_distortion::ShownDistortion;
 pub(crate) use shown_field::SIZE_SIGMA;
 pub use shown_field::with_shown_field;
@@ -255,6 +256,7 @@ fn finish(
         hand_eye: HandEye::new(problem.mode, state.mount_from_camera, state.anchor_from_target),
         intrinsics: state.intrinsics,
         shape: state.shape,
+        depth: state.depth,
         joint_offsets_rad: state.joints_rad.clone(),
         field: state.field.clone(),
         deviance: None,

@@ -61,7 +61,7 @@ impl System {
             blocks: Vec::with_capacity(problem.views.len()),
             corrections: state.corrections.clone(),
             layout,
-            priors: priors(state, layout),
+            priors: priors(problem, state, layout),
             known_lens: known_lens(problem, state),
             slopes: state.field.as_ref().map_or_else(Vec::new, |field| field.slopes().to_vec()),
             shared: DMatrix::zeros(n, n),
@@ -100,7 +100,7 @@ impl System {
     }
 
     pub fn residual_count(&self) -> usize {
-        2 * self.blocks.iter().map(|block| block.corners).sum::<usize>()
+        self.blocks.iter().map(|block| 2 * block.corners + block.depths).sum()
     }
 
     /// Minus twice the log of the joint density at the point of linearisation, without the normalising terms.
@@ -211,7 +211,13 @@ impl System {
 /// Prior of a joint whose offset cannot be told: as good as none.
 const HELD_JOINT_RAD: f64 = 1e-8;
 
-fn priors(state: &State, layout: Layout) -> Vec<SharedPrior> {
+/// Standard deviations of offset, scale and slope of a depth camera before any data: metres, a part, pixels. They are no knowledge,
+/// but where the board is always as far away its distance tells no offset from a scale.
+const DEPTH_PRIOR: [f64; 3] = [0.1, 0.1, 3.0];
+/// Of its tilt where the depths do not count, radians.
+const DEPTH_TILT_RAD: f64 = 0.1;
+
+fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<SharedPrior> {
     // The target takes up an offset of the first joint, and the hand-eye or the target one of the last: freeing them adds
     // nothing but the width of their prior.
     let last = state.joints_rad.len().saturating_sub(1);
@@ -221,7 +227,15 @@ fn priors(state: &State, layout: Layout) -> Vec<SharedPrior> {
         offset: *offset,
         precision: sigma(j).powi(-2),
     });
-    joints.collect()
+    let depth_at = Layout::FORM_AT + problem.free.form().depth_at(&state.intrinsics);
+    let tilt = problem.depth.map_or(DEPTH_TILT_RAD, |weight| weight.tilt_sigma_rad);
+    let sigmas = DEPTH_PRIOR.into_iter().chain([tilt; 2]);
+    let depth = state.depth.values().into_iter().zip(sigmas).enumerate().map(|(k, (offset, sigma))| SharedPrior {
+        index: depth_at + k,
+        offset,
+        precision: sigma.powi(-2),
+    });
+    joints.chain(depth.filter(|_| problem.free.depth)).collect()
 }
 
 fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {

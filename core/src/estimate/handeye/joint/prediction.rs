@@ -117,7 +117,7 @@ pub fn error_by_views<'a>(
     Ok(ErrorCurve { gathered, further })
 }
 
-/// The views linearised at a solution with the robot where it was reported to be.
+/// The corners of the views linearised at a solution with the robot where it was reported to be.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
@@ -127,7 +127,8 @@ pub(crate) fn reported(
     cancel: &CancelToken,
 ) -> Result<System, HandEyeError> {
     let corrections = vec![Vector6::zeros(); solution.linearised(problem)?.blocks.len()];
-    System::new(problem, &State { corrections, ..State::of(solution) }, cancel)
+    let problem = JointProblem { depth: None, ..*problem };
+    System::new(&problem, &State { corrections, ..State::of(solution) }, cancel)
 }
 
 /// Numbers from `first` to `last`, all of them or [`MOST_POINTS`] evenly spaced; both ends are among them.

@@ -7,9 +7,10 @@ use crate::estimate::handeye::joint::chain::MAX_JOINTS;
 use crate::estimate::handeye::joint::field::{Places, RobotField};
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::weights::CornerWeights;
+use crate::estimate::handeye::joint::with_depths::TURNED_RAD;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::View;
 
@@ -54,11 +55,13 @@ pub struct Free {
     pub joints: bool,
     /// Errors of the robot that depend on where it stands, see [`RobotField`].
     pub field: bool,
+    /// Errors of the depths of the views, see [`DepthBias`](crate::geometry::view_equations::DepthBias).
+    pub depth: bool,
 }
 
 impl Free {
-    pub(crate) fn form(self) -> crate::geometry::view_equations::FreeParameters {
-        crate::geometry::view_equations::FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale }
+    pub(crate) fn form(self) -> FreeParameters {
+        FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale, depth: self.depth }
     }
 }
 
@@ -70,6 +73,22 @@ pub struct LensPrior<'a> {
     /// Inverse of their covariance, in the order of [`Intrinsics::parameters`] and of their size; a direction of which
     /// nothing is known has none.
     pub information: &'a DMatrix<f64>,
+}
+
+/// How depths count against corners, and what is known of their tilt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthWeight {
+    /// Pixels of a corner's error that a metre of the depths' counts as.
+    pub px_per_m: f64,
+    /// Standard deviation of the tilt of the depths before any data, about either axis, radians.
+    pub tilt_sigma_rad: f64,
+}
+
+impl DepthWeight {
+    /// Whether the tilt of the depths is open.
+    pub fn is_turned(self) -> bool {
+        self.tilt_sigma_rad >= TURNED_RAD
+    }
 }
 
 /// The data and what is known beforehand.
@@ -87,6 +106,8 @@ pub struct JointProblem<'a> {
     pub lens_prior: Option<LensPrior<'a>>,
     /// How corners are weighed against each other; `None` for all alike.
     pub weights: Option<CornerWeights>,
+    /// How the depths of the views count; `None` where they do not.
+    pub depth: Option<DepthWeight>,
     /// Noise levels when they are known; otherwise they are estimated.
     pub noise: Option<Noise>,
     /// Whether the corners of a view share noise ([`Noise::view_px`]), where that is decided; otherwise these views decide.
@@ -103,6 +124,7 @@ impl<'a> JointProblem<'a> {
             free: Free::default(),
             lens_prior: None,
             weights: None,
+            depth: None,
             noise: None,
             view_noise: None,
         }
@@ -121,6 +143,11 @@ impl<'a> JointProblem<'a> {
             shape: &state.shape,
             corners: &view.corners,
             sqrt_weights,
+            depths: self.depth.zip(view.depth.as_ref()).map(|(weight, plane)| MeasuredDepths {
+                plane,
+                bias: &state.depth,
+                px_per_m: weight.px_per_m,
+            }),
         }
     }
 

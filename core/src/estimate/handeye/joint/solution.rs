@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Matrix6, Point3, Vector6};
+use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector6};
 
 use crate::estimate::handeye::joint::JointProblem;
 use crate::estimate::handeye::joint::field::{RobotField, corrected_base_from_tip};
@@ -14,6 +14,7 @@ use crate::estimate::handeye::{HandEye, HandEyeError};
 use crate::estimate::uncertainty::widening::{self, Widening};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use crate::geometry::view_equations::DepthBias;
 use crate::targets::bent::BoardShape;
 use crate::targets::observation::View;
 
@@ -40,14 +41,16 @@ pub struct JointSolution {
     pub intrinsics: Intrinsics,
     /// Shape of the target, estimated or as given.
     pub shape: BoardShape,
+    /// Errors of the depths; none where they were not estimated.
+    pub depth: DepthBias,
     /// Offsets of the joints, radians, to be added to the reported angles; empty when they were not estimated.
     pub joint_offsets_rad: Vec<f64>,
     /// Errors of the robot that depend on where it stands; `None` when they were not estimated.
     pub field: Option<RobotField>,
     /// Minus twice the log of the restricted likelihood of the noise levels; `None` when these were given.
     pub deviance: Option<f64>,
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, joints,
-    /// slopes of the field]`, metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale,
+    /// errors of depths, joints, slopes of the field]`, metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
     /// unknown, that of estimated noise levels too.
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
@@ -106,6 +109,12 @@ impl JointSolution {
     /// Standard deviation of the scale; `None` when it was not estimated.
     pub fn scale_sigma(&self) -> Option<f64> {
         self.free.scale.then(|| self.sigma(12 + self.free.form().scale_at(&self.intrinsics)))
+    }
+
+    /// Covariance of the errors of the depths, in the order of [`DepthBias`]; zero when they were not estimated.
+    pub fn depth_covariance(&self) -> Matrix5<f64> {
+        let at = 12 + self.free.form().depth_at(&self.intrinsics);
+        if self.free.depth { self.covariance.fixed_view::<5, 5>(at, at).into_owned() } else { Matrix5::zeros() }
     }
 
     /// Standard deviations of the joint offsets, radians.

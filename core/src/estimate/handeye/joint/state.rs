@@ -8,6 +8,8 @@ use crate::estimate::handeye::joint::view_block::Layout;
 use crate::estimate::handeye::joint::{JointProblem, JointSolution, JointStart};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use crate::geometry::se3;
+use crate::geometry::view_equations::DepthBias;
 use crate::targets::bent::BoardShape;
 use crate::targets::observation::View;
 
@@ -18,6 +20,8 @@ pub struct State {
     pub anchor_from_target: Pose<Anchor, Target>,
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
+    /// None where it is not free.
+    pub depth: DepthBias,
     /// Empty when the joints are not free.
     pub joints_rad: Vec<f64>,
     /// `None` when it is not free.
@@ -33,6 +37,7 @@ impl State {
             anchor_from_target: start.anchor_from_target,
             intrinsics: start.intrinsics,
             shape: start.shape,
+            depth: DepthBias::default(),
             joints_rad: vec![0.0; problem.joint_count()],
             field: problem.field(),
             corrections: vec![Vector6::zeros(); problem.views.len()],
@@ -46,6 +51,7 @@ impl State {
             anchor_from_target: solution.hand_eye.anchor_from_target(),
             intrinsics: solution.intrinsics,
             shape: solution.shape,
+            depth: solution.depth,
             joints_rad: solution.joint_offsets_rad.clone(),
             field: solution.field.clone(),
             corrections: solution.views.iter().map(|view| view.correction).collect(),
@@ -97,6 +103,11 @@ impl State {
         if form.scale {
             next.shape.scale += at(form.scale_at(&self.intrinsics));
         }
+        if form.depth {
+            let first = form.depth_at(&self.intrinsics);
+            let before = self.depth.values();
+            next.depth = DepthBias::new(std::array::from_fn(|k| before[k] + at(first + k)));
+        }
         let layout = self.layout(problem);
         for (j, offset) in next.joints_rad.iter_mut().enumerate() {
             *offset += shared[layout.joints_at() + j];
@@ -108,6 +119,40 @@ impl State {
             *correction += step;
         }
         next
+    }
+
+    /// The step of the shared unknowns that leads to another state with the same unknowns.
+    pub fn step_to(&self, other: &Self, problem: &JointProblem<'_>) -> DVector<f64> {
+        let layout = self.layout(problem);
+        let mut step = DVector::zeros(layout.count());
+        let mount = self.mount_from_camera.inverse() * other.mount_from_camera;
+        let anchor = self.anchor_from_target.inverse() * other.anchor_from_target;
+        step.fixed_rows_mut::<6>(0).copy_from(&se3::log(mount.isometry()));
+        step.fixed_rows_mut::<6>(6).copy_from(&se3::log(anchor.isometry()));
+        let mut put = |at: usize, from: &[f64], to: &[f64]| {
+            for (k, (from, to)) in from.iter().zip(to).enumerate() {
+                step[at + k] = to - from;
+            }
+        };
+        let form = problem.free.form();
+        let at = |column: usize| Layout::FORM_AT + column;
+        if form.lens {
+            put(at(0), &self.intrinsics.parameters(), &other.intrinsics.parameters());
+        }
+        if form.warp {
+            put(at(form.warp_at(&self.intrinsics)), &self.shape.warp_m, &other.shape.warp_m);
+        }
+        if form.scale {
+            put(at(form.scale_at(&self.intrinsics)), &[self.shape.scale], &[other.shape.scale]);
+        }
+        if form.depth {
+            put(at(form.depth_at(&self.intrinsics)), &self.depth.values(), &other.depth.values());
+        }
+        put(layout.joints_at(), &self.joints_rad, &other.joints_rad);
+        if let (Some(from), Some(to)) = (&self.field, &other.field) {
+            put(layout.field_at(), from.slopes(), to.slopes());
+        }
+        step
     }
 
     /// Mean over the views of the target's middle in camera coordinates.

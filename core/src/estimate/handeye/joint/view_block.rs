@@ -135,6 +135,8 @@ pub struct ViewBlock {
     pub own: Matrix6<f64>,
     pub rest: Rest,
     pub corners: usize,
+    /// Residuals of depths.
+    pub depths: usize,
 }
 
 impl ViewBlock {
@@ -154,7 +156,15 @@ impl ViewBlock {
         }
         let by_shared = by_shared.transpose();
         let own = by_correction.tr_mul(&by_correction);
-        Some(Self { residual, by_shared, by_correction, own, rest, corners: equations.corners })
+        Some(Self {
+            residual,
+            by_shared,
+            by_correction,
+            own,
+            rest,
+            corners: equations.corners,
+            depths: equations.depths,
+        })
     }
 
     /// `L`: the pose that the target's place in the anchor turns is the view's own.

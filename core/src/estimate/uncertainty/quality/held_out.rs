@@ -171,7 +171,10 @@ pub fn pose_of_view(
     corners: &[Corner],
     start: &Pose<Camera, Target>,
 ) -> Option<Pose<Camera, Target>> {
-    weighted_pose_of_view(&ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[] }, start.isometry())
+    weighted_pose_of_view(
+        &ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[], depths: None },
+        start.isometry(),
+    )
 }
 
 /// The same with corners that count as they are weighed.
