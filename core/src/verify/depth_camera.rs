@@ -10,7 +10,7 @@
 //! ```
 //!
 //! with `z` the distance of the board along the optical axis, `z̄` the mean of that, and `g` by how much the depth of the board
-//! changes from one pixel to the next: what a renderer's polygon offset, or a matcher that prefers the nearer or the farther
+//! changes from one pixel to the next ([`DepthBias`](crate::geometry::view_equations::DepthBias)): what a renderer's polygon offset, or a matcher that prefers the nearer or the farther
 //! pixel, adds. Captures scatter about that by more than their depths do (neighbours have the same error), so the scatter of the
 //! captures is what the uncertainty is from, by ordinary least squares. A focal length that is off puts the board off by the same
 //! part; its uncertainty is added. A target of another size than stated does the same, and nothing here knows.
@@ -138,8 +138,8 @@ impl<'a> DepthCheck<'a> {
     }
 
     /// What all of them say, with the standard deviation of the focal length \[px\]; `None` without a capture that shows depths of
-    /// the board. Where the calibration itself counts on the depths, the captures agree with them: then it is what its estimate has
-    /// them off by (`in_fit`).
+    /// the board. Where a joint estimate was tried with the depths (`in_fit`), it is what that has them off by: its covariance knows what
+    /// lens and camera leave open, and the captures of an answer that counts on depths agree with them.
     pub fn finish(self, sigma_focal_px: f64, in_fit: Option<&DepthsInFit>) -> Option<DepthReport> {
         let ratio = median_high(self.ratios.iter().copied())?;
         let fill = self.fills.iter().sum::<f64>() / self.fills.len() as f64;
@@ -148,7 +148,7 @@ impl<'a> DepthCheck<'a> {
             return Some(report);
         }
         let of_focal = sigma_focal_px * 2.0 / (self.lens.fx + self.lens.fy);
-        let errors = match in_fit.filter(|depths| depths.accepted) {
+        let errors = match in_fit {
             Some(depths) => estimated_with(depths, &self.planes),
             None => errors(&self.planes, of_focal),
         };

@@ -8,7 +8,8 @@ use crate::targets::bent::BoardShape;
 use crate::targets::depth_plane::DepthPlane;
 
 /// How a depth camera errs: what it measures of a point `(x, y, z)` of the camera's frame is
-/// `z + offset + scale z + slope g + tilt_x y − tilt_y x`, where `g` is by how much the depth changes from one pixel to the next.
+/// `z + offset + scale z + slope g + tilt_x y − tilt_y x`, where `g` is by how much the depth changes from one pixel to the next,
+/// along the row or the column, whichever is more (OpenGL 4.6, §14.6.5, has polygon offsets so).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthBias {
     /// Added to every depth, metres.
@@ -71,9 +72,10 @@ impl PredictedDepths {
         let there = camera_from_target * place;
         // From pixel to pixel: z² times the slope of the inverse depth. How that turns with the pose is left out: it would change
         // what a pixel's worth of it adds by a thousandth of the slope.
-        let focal_px = 0.5 * (intrinsics.fx + intrinsics.fy);
-        let towards = rotation.column(2).dot(&there.coords) / there.z;
-        let slant = row.xy().norm() / (focal_px * towards.abs().max(f64::EPSILON));
+        let normal = rotation.column(2);
+        let towards = normal.dot(&there.coords) / there.z;
+        let steepest = (normal.x / intrinsics.fx).abs().max((normal.y / intrinsics.fy).abs());
+        let slant = steepest / towards.abs().max(f64::EPSILON);
         let longer = 1.0 + bias.scale;
         // The measured depth is linear in the place with these for the third row of the rotation: at one place, and from place to
         // place, where the slope's part grows twice as fast as the depth.
@@ -142,5 +144,60 @@ impl MeasuredDepths<'_> {
                 equations.form[(*i, *j)] += column.dot(&(information * other));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Vector2, Vector6};
+
+    use super::*;
+    use crate::geometry::se3;
+
+    /// Against differences of the prediction: of pose, size and every error of the depth camera. What a pixel's worth of the slope
+    /// adds turns with the pose by less than is asked for here.
+    #[test]
+    fn depths_turn_with_pose_size_and_bias_as_differences_say() {
+        const STEP: f64 = 1e-6;
+        let lens = Intrinsics { fy: 575.0, ..Intrinsics::pinhole(640, 480, 581.0) };
+        let plane = DepthPlane {
+            place_m: Vector2::new(0.05, 0.03),
+            depth: Vector3::zeros(),
+            information: Matrix3::identity(),
+            scatter_m: 0.0,
+            fill: 1.0,
+        };
+        let pose = Isometry3::new(Vector3::new(-0.05, -0.08, 0.4), Vector3::new(0.5, -0.4, 0.2));
+        let shape = BoardShape { warp_m: [0.0; 2], scale: 1.02 };
+        let bias = DepthBias::new([0.004, 0.01, 0.5, 0.005, -0.008]);
+        let at = |pose: &Isometry3<f64>, scale: f64, bias: &DepthBias| {
+            PredictedDepths::new(&lens, &BoardShape { scale, ..shape }, &plane, bias, pose).depth
+        };
+        let there = PredictedDepths::new(&lens, &shape, &plane, &bias, &pose);
+        let difference = |up: Vector3<f64>, down: Vector3<f64>| (up - down) / (2.0 * STEP);
+        for k in 0..6 {
+            let moved = |sign: f64| pose * se3::exp(&Vector6::ith(k, sign * STEP));
+            let expected = difference(at(&moved(1.0), shape.scale, &bias), at(&moved(-1.0), shape.scale, &bias));
+            let off = there.by_pose.column(k) - expected;
+            assert!(off.norm() < 5e-3, "{k}: {off:?}");
+            let straight = DepthBias { slope_px: 0.0, ..bias };
+            let exact = PredictedDepths::new(&lens, &shape, &plane, &straight, &pose).by_pose.column(k).into_owned();
+            let expected =
+                difference(at(&moved(1.0), shape.scale, &straight), at(&moved(-1.0), shape.scale, &straight));
+            assert!((exact - expected).norm() < 1e-8, "{k}: {exact:?} {expected:?}");
+        }
+        for k in 0..DepthBias::COUNT {
+            let changed = |sign: f64| {
+                let mut values = bias.values();
+                values[k] += sign * STEP;
+                DepthBias::new(values)
+            };
+            let expected = difference(at(&pose, shape.scale, &changed(1.0)), at(&pose, shape.scale, &changed(-1.0)));
+            assert!((there.by_bias[k] - expected).norm() < 1e-8, "{k}");
+        }
+        let straight = DepthBias { slope_px: 0.0, ..bias };
+        let exact = PredictedDepths::new(&lens, &shape, &plane, &straight, &pose).by_scale;
+        let expected = difference(at(&pose, shape.scale + STEP, &straight), at(&pose, shape.scale - STEP, &straight));
+        assert!((exact - expected).norm() < 1e-8, "{exact:?} {expected:?}");
     }
 }

@@ -23,6 +23,7 @@ pub(crate) const MAX_FORM: usize = MAX_PARAMETERS + 3 + DepthBias::COUNT;
 
 /// Which unknowns of lens and target shape are free. Their columns are, without gaps, the lens parameters in the order of
 /// [`Intrinsics::parameters`], the two warps, the scale, and the errors of a depth camera ([`DepthBias`]).
+#[expect(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FreeParameters {
     pub lens: bool,
