@@ -79,7 +79,7 @@ fn a_session_is_read_from_its_journal_and_not_from_the_files_that_follow_from_it
 }
 
 #[test]
-fn journal_and_images_are_enough_for_every_command() {
+fn journal_images_and_depths_are_enough_for_every_command() {
     let (_home, session) = copy_of_session();
     edit(&session);
     let (result, diagnosis) = (calibrated(&session), diagnosed(&session));
@@ -96,13 +96,20 @@ fn journal_and_images_are_enough_for_every_command() {
     for name in ["session.json", "dataset.toml", "poses.csv", "result.json", ".lock"] {
         fs::remove_file(session.join(name)).expect("removed");
     }
-    fs::remove_dir_all(session.join("depth")).expect("removed");
     fs::remove_dir_all(session.join("exports")).expect("removed");
-    // Of a depth camera nothing is known without its images, and the answer does not depend on it.
     assert!(result.depth.is_some_and(|depth| depth.errors.is_some()), "{:?}", result.depth);
-    let without_depths = CalibrationResult { depth: None, ..result };
-    assert_eq!((calibrated(&session), diagnosed(&session)), (without_depths, diagnosis));
+    let with_depths = result.clone();
+    assert_eq!((calibrated(&session), diagnosed(&session)), (result, diagnosis));
     let (bare_images, bare_transforms) = views(&session, "bare");
     assert_eq!(bare_images.expect("written"), images.expect("written"));
     assert_eq!(bare_transforms.expect("written"), transforms.expect("written"));
+    // The answer of the corners is another one than that of corners and depths, and nothing is known of a depth camera.
+    fs::remove_dir_all(session.join("depth")).expect("removed");
+    let of_corners = calibrated(&session);
+    assert_eq!(of_corners.depth, None);
+    let depths = |result: &CalibrationResult| result.estimate.as_ref().and_then(|estimate| estimate.depths);
+    assert!(depths(&with_depths).is_some() && depths(&of_corners).is_none(), "{:?}", with_depths.estimate);
+    let place = |result: &CalibrationResult| result.hand_eye.as_ref().expect("a hand-eye").translation_m;
+    let off_m = place(&of_corners).iter().zip(place(&with_depths)).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    assert!(off_m < 1e-3, "{off_m}");
 }
