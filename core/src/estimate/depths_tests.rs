@@ -87,6 +87,9 @@ fn error_m_of(t: &Trial, found: &Calibration) -> f64 {
 /// By how much the depths of a camera are off, by place in the image (−1 … 1) and depth; drawn anew for every image.
 type Error = Box<dyn Fn(Vector2<f64>, f64) -> f64>;
 
+/// Makes one for every image.
+type DepthCamera = dyn Fn(&mut ChaCha8Rng) -> Error;
+
 const SINGLE_DEPTHS_M: f64 = 3e-4;
 
 /// A camera whose depths are measured along its lens, with an offset of 5 mm and a scale of one part in a hundred.
@@ -112,7 +115,7 @@ fn depths_that_are_off_as_the_model_does_not_know_do_no_harm() {
         let [a, b, c] = std::array::from_fn(|_| normal(rng));
         Box::new(move |place, _| 0.001 * (a + b * (3.0 * place.x + c).sin() + c * (3.0 * place.y + a).cos()))
     };
-    let cameras: [(&str, &dyn Fn(&mut ChaCha8Rng) -> Error); 5] = [
+    let cameras: [(&str, &DepthCamera); 5] = [
         ("turned by 0.5°", &turned),
         ("a bowl of 4 mm", &bowl),
         ("2 % of the squared depth", &by_square),
