@@ -119,7 +119,7 @@ fn depth_camera(report: &DepthReport, in_fit: Option<&DepthsInFit>) -> Option<Es
         )
     };
     let why = match in_fit {
-        Some(depths) if depths.accepted && depths.turned => text!(
+        Some(depths) if depths.accepted && depths.weight.turned => text!(
             "The answer uses the depths, and leaves open how far the depth camera is turned: views left out are predicted to {after} px \
              with them and {before} px without",
             after = format!("{:.3}", depths.heldout_after_px),

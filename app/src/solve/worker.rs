@@ -133,6 +133,8 @@ fn depth_camera(job: &SolveJob, calibration: &Calibration) -> Option<DepthReport
     for (view, observed) in calibration.views.iter().zip(&job.observations.views) {
         let used = view.camera_from_target.filter(|_| view.status == ViewStatus::Used);
         if let Some((board, depth)) = used.zip(observed.depth) {
+            // The pose is that of the target as the other views count it.
+            let depth = depth.renumbered(&job.observations.target, view.quarter_turns);
             check.add(&depth, board.isometry());
         }
     }

@@ -192,7 +192,7 @@ fn renumber(
     target: &TargetSpec,
     quarters: usize,
 ) {
-    observation::renumber(&mut view.corners, target, quarters);
+    observation::renumber(&mut view.corners, &mut view.depth, target, quarters);
     let turns = Turns::of(target);
     for pose in std::iter::once(&mut pair.camera_from_target).chain(alternative) {
         *pose = turns.turned(pose, quarters);

@@ -130,3 +130,30 @@ fn depths_that_are_off_as_the_model_does_not_know_do_no_harm() {
         assert!(found.within[1] >= 0.8 * found.sessions, "{name}: {found:?}");
     }
 }
+
+/// The errors that the depths of 20 views have, each found to what is stated of it, and none mistaken for another.
+#[test]
+fn the_errors_of_a_depth_camera_are_found_to_what_is_stated() {
+    let mut t = trial(Mode::EyeInHand, 20, &NOISE, camera(), 41);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let turned = 0.5_f64.to_radians();
+    for (view, board) in t.views.iter_mut().zip(&t.true_camera_from_target) {
+        // Of the pixel's own ray: a turn about the camera's y brings nearer what lies at positive x.
+        let lens = t.intrinsics;
+        let across = move |place: Vector2<f64>| (place.x * 320.0 + 320.0 - lens.cx) / lens.fx;
+        let error = |place: Vector2<f64>, depth: f64| 0.005 + 0.01 * depth - turned * across(place) * depth;
+        let image = depth_image(&mut rng, &lens, board.isometry(), SINGLE_DEPTHS_M, error);
+        view.depth = DepthPlane::new(&image, (lens.width, lens.height), &view.corners, &BOARD);
+    }
+    let found = calibrate(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+    let depths = found.joint.and_then(|joint| joint.depths).expect("depths");
+    let (values, covariance) = (depths.in_fit.bias.values(), depths.in_fit.covariance);
+    let expected = [0.005, 0.01, 0.0, 0.0, turned];
+    for (k, (value, expected)) in values.iter().zip(expected).enumerate() {
+        let sigma = covariance[(k, k)].sqrt();
+        assert!((value - expected).abs() < 3.5 * sigma, "{k}: {value} ± {sigma}, not {expected}");
+    }
+    let tilt_sigma = covariance[(4, 4)].sqrt();
+    assert!(tilt_sigma < turned / 5.0, "{tilt_sigma}: it would not be seen");
+    assert!(depths.in_fit.weight.turned && depths.in_fit.other_probability < 0.05, "{depths:?}");
+}

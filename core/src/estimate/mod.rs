@@ -200,9 +200,7 @@ pub struct DepthsInFit {
     pub noise_m: f64,
     /// How they count against corners.
     pub weight: DepthWeight,
-    /// Whether the answer leaves it open how far the depth camera is turned against the lens, and does not take it for straight.
-    pub turned: bool,
-    /// Probability that it is the other way.
+    /// Probability that it is the other way with whether the depth camera is turned against the lens.
     pub other_probability: f64,
     /// Errors of the depth camera where that is left open.
     pub bias: DepthBias,

@@ -345,7 +345,6 @@ fn depths(
         views: found.views,
         noise_m: found.solution.noise.corner_px / found.weight.px_per_m,
         weight: found.weight,
-        turned: found.weight.is_turned(),
         other_probability: found.other.probability,
         bias: found.open.0,
         covariance: found.open.1,

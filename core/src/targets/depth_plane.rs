@@ -11,7 +11,7 @@
 //! tell worst. The depth of a corner is that of a plane through the inverse depths of the pixels around it, because inverse depth is
 //! linear in the pixel.
 
-use nalgebra::{Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point3, Vector2, Vector3};
 
 use crate::depth::{DepthImage, DepthSample, outlier_reach_m};
 use crate::geometry::statistics::median_high;
@@ -31,7 +31,7 @@ const LEAST: f64 = 0.5;
 /// And the least number: three determine a plane.
 const LEAST_CORNERS: usize = 6;
 /// Planes through three corners that are tried: with half of the corners off, one in eight triples is good, and all are bad once in
-/// five hundred images.
+/// six hundred images.
 const TRIED: usize = 48;
 const ROUNDS: usize = 8;
 
@@ -95,6 +95,27 @@ impl DepthPlane {
     pub fn depth_at(&self, place: &Point3<f64>) -> f64 {
         let aside = place.xy().coords - self.place_m;
         self.depth.dot(&Vector3::new(1.0, aside.x, aside.y))
+    }
+
+    /// The same where the target is counted from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away.
+    #[must_use]
+    pub fn renumbered(&self, target: &TargetSpec, quarter_turns: usize) -> Self {
+        // A point of the target as it was counted is `turn` times that as it is counted now, about the middle of the target.
+        let turn = match quarter_turns % 4 {
+            0 => Matrix2::identity(),
+            1 => Matrix2::new(0.0, -1.0, 1.0, 0.0),
+            2 => -Matrix2::identity(),
+            _ => Matrix2::new(0.0, 1.0, -1.0, 0.0),
+        };
+        let centre = target.centre().xy().coords;
+        let mut of_all = Matrix3::identity();
+        of_all.fixed_view_mut::<2, 2>(1, 1).copy_from(&turn);
+        Self {
+            place_m: centre + turn.transpose() * (self.place_m - centre),
+            depth: of_all.transpose() * self.depth,
+            information: of_all.transpose() * self.information * of_all,
+            ..*self
+        }
     }
 
     fn through(samples: &[Sample]) -> Option<Self> {

@@ -1,6 +1,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::*;
+use crate::targets::Grid;
+use crate::targets::observation::renumber;
 use crate::testing::moving_board::{Stage, centre, lens};
 use crate::testing::sessions::BOARD;
 
@@ -65,4 +67,32 @@ fn what_covers_a_part_of_the_target_does_not_tilt_it() {
     assert_eq!(of(&depth), None);
     let other = stage.depth(&board, 2);
     assert_eq!(DepthPlane::new(&other, (1280, 960), &corners, &BOARD), None, "of an image of another size");
+}
+
+/// Against depths at the same pixels, whose corners were counted otherwise from the start.
+#[test]
+fn a_plane_counted_from_another_corner_is_that_of_corners_counted_so() {
+    let mut stage = Stage::new();
+    stage.depth_noise_m = 3e-4;
+    for (columns, rows, quarters) in [(9, 7, 2), (8, 8, 1), (8, 8, 2), (8, 8, 3)] {
+        let target = TargetSpec::Chessboard(Grid { columns, rows, square_m: 0.015 });
+        assert!(target.quarter_turns().contains(&quarters));
+        let board = board([0.5, -0.3], 0.4);
+        let depth = stage.depth(&board, 3);
+        let points = target.points();
+        let corner =
+            |(i, point): (usize, &Point3<f64>)| Corner::new(i, lens().project(&(board * point)).expect("in front"));
+        // Some of them, so that their mean place is not the middle.
+        let mut corners: Vec<Corner> = points.iter().enumerate().map(corner).skip(5).collect();
+        let of = |corners: &[Corner]| DepthPlane::new(&depth, (640, 480), corners, &target);
+        let mut plane = of(&corners);
+        renumber(&mut corners, &mut plane, &target, quarters);
+        let (found, expected) = (plane.expect("a plane"), of(&corners).expect("a plane"));
+        assert!(
+            (found.place_m - expected.place_m).norm() < 1e-12,
+            "{columns} × {rows}, {quarters}: {found:?} {expected:?}"
+        );
+        assert!((found.depth - expected.depth).norm() < 1e-9, "{columns} × {rows}, {quarters}: {found:?} {expected:?}");
+        assert!((found.information - expected.information).norm() < 1e-12, "{found:?} {expected:?}");
+    }
 }

@@ -116,13 +116,14 @@ impl View {
     }
 }
 
-/// Numbers the corners of a target from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away, and sorts them
-/// by number.
-pub fn renumber(corners: &mut [Corner], target: &TargetSpec, quarter_turns: usize) {
+/// Numbers what an image shows of a target from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away; the
+/// corners are then sorted by number.
+pub fn renumber(corners: &mut [Corner], depth: &mut Option<DepthPlane>, target: &TargetSpec, quarter_turns: usize) {
     for corner in corners.iter_mut() {
         corner.index = target.renumbered(corner.index, quarter_turns);
     }
     corners.sort_by_key(|corner| corner.index);
+    *depth = depth.map(|plane| plane.renumbered(target, quarter_turns));
 }
 
 #[cfg(test)]

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! with `z` the distance of the board along the optical axis, `z̄` the mean of that, and `g` by how much the depth of the board
-//! changes from one pixel to the next ([`DepthBias`](crate::geometry::view_equations::DepthBias)): what a renderer's polygon offset, or a matcher that prefers the nearer or the farther
-//! pixel, adds. Captures scatter about that by more than their depths do (neighbours have the same error), so the scatter of the
+//! changes from one pixel to the next ([`DepthBias`](crate::estimate::DepthBias)): what a renderer's polygon offset, or a matcher
+//! that prefers the nearer or the farther pixel, adds. Captures scatter about that by more than their depths do (neighbours have the same error), so the scatter of the
 //! captures is what the uncertainty is from, by ordinary least squares. A focal length that is off puts the board off by the same
 //! part; its uncertainty is added. A target of another size than stated does the same, and nothing here knows.
 
@@ -148,7 +148,7 @@ impl<'a> DepthCheck<'a> {
             return Some(report);
         }
         let of_focal = sigma_focal_px * 2.0 / (self.lens.fx + self.lens.fy);
-        let errors = match in_fit {
+        let errors = match in_fit.filter(|_| !self.planes.is_empty()) {
             Some(depths) => estimated_with(depths, &self.planes),
             None => errors(&self.planes, of_focal),
         };

@@ -429,7 +429,7 @@ fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor
     observations.target = TargetSpec::Circles(GRID);
     for n in [2, 3, 9, 13] {
         let corners = observations.views[n].corners.as_mut().expect("seen");
-        handeye_core::targets::observation::renumber(corners, &TargetSpec::Circles(GRID), 2);
+        handeye_core::targets::observation::renumber(corners, &mut None, &TargetSpec::Circles(GRID), 2);
     }
     let cancel = CancelToken::default();
     let (true_mount_from_camera, _) = faulty::links(Mode::EyeInHand);

@@ -182,7 +182,7 @@ fn as_found(observations: &Observations, calibration: &Calibration) -> Option<Ob
     for (view, result) in observations.views.iter_mut().zip(&calibration.views) {
         let Some(corners) = view.corners.as_mut() else { continue };
         if result.quarter_turns != 0 {
-            observation::renumber(corners, &observations.target, result.quarter_turns);
+            observation::renumber(corners, &mut view.depth, &observations.target, result.quarter_turns);
         }
         let Some(((print, lens), pose)) = print.zip(result.camera_from_target) else { continue };
         for corner in corners {

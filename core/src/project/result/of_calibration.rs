@@ -111,7 +111,7 @@ fn depths_estimate(depths: &DepthsInFit) -> DepthsEstimate {
     DepthsEstimate {
         captures: depths.views,
         noise_mm: depths.noise_m * 1e3,
-        turned: depths.turned,
+        turned: depths.weight.turned,
         other_probability: depths.other_probability,
         heldout_before_px: depths.heldout_before_px,
         heldout_after_px: depths.heldout_after_px,

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
 use super::field::HALF;
 use super::view_block::{Layout, Own, PixelWeights, Rest, ViewBlock, add_rest, add_square, columns, prior_weight};
-use super::{JOINT_PRIOR_RAD, JointProblem, Noise};
+use super::{DepthWeight, JOINT_PRIOR_RAD, JointProblem, Noise};
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::state::State;
 use crate::geometry::se3::skew;
@@ -214,8 +214,6 @@ const HELD_JOINT_RAD: f64 = 1e-8;
 /// Standard deviations of offset, scale and slope of a depth camera before any data: metres, a part, pixels. They are no knowledge,
 /// but where the board is always as far away its distance tells no offset from a scale.
 const DEPTH_PRIOR: [f64; 3] = [0.1, 0.1, 3.0];
-/// Of its tilt where the depths do not count, radians.
-const DEPTH_TILT_RAD: f64 = 0.1;
 
 fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<SharedPrior> {
     // The target takes up an offset of the first joint, and the hand-eye or the target one of the last: freeing them adds
@@ -228,7 +226,8 @@ fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<Shar
         precision: sigma(j).powi(-2),
     });
     let depth_at = Layout::FORM_AT + problem.free.form().depth_at(&state.intrinsics);
-    let tilt = problem.depth.map_or(DEPTH_TILT_RAD, |weight| weight.tilt_sigma_rad);
+    // Where the depths do not count nothing tells the tilt.
+    let tilt = problem.depth.map_or(1.0, DepthWeight::tilt_sigma_rad);
     let sigmas = DEPTH_PRIOR.into_iter().chain([tilt; 2]);
     let depth = state.depth.values().into_iter().zip(sigmas).enumerate().map(|(k, (offset, sigma))| SharedPrior {
         index: depth_at + k,

@@ -7,7 +7,6 @@ use crate::estimate::handeye::joint::chain::MAX_JOINTS;
 use crate::estimate::handeye::joint::field::{Places, RobotField};
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::weights::CornerWeights;
-use crate::estimate::handeye::joint::with_depths::TURNED_RAD;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput};
@@ -80,16 +79,23 @@ pub struct LensPrior<'a> {
 pub struct DepthWeight {
     /// Pixels of a corner's error that a metre of the depths' counts as.
     pub px_per_m: f64,
-    /// Standard deviation of the tilt of the depths before any data, about either axis, radians.
-    pub tilt_sigma_rad: f64,
+    /// Whether it is open how far they are turned against the lens; otherwise they are measured along it.
+    pub turned: bool,
 }
 
 impl DepthWeight {
-    /// Whether the tilt of the depths is open.
-    pub fn is_turned(self) -> bool {
-        self.tilt_sigma_rad >= TURNED_RAD
+    /// Standard deviation of the tilt of the depths before any data, about either axis, radians.
+    pub(super) fn tilt_sigma_rad(self) -> f64 {
+        if self.turned { TURNED_RAD } else { STRAIGHT_RAD }
     }
 }
+
+/// Standard deviation of the tilt of depths that are not measured along the lens, about either axis, radians. That it is 0.3° is an
+/// assumption about mountings of two sensors; its order is what matters. Where the tilt is known to a twentieth of it, depths count
+/// as turned from 3.5 of the tilt's standard deviations on, and with three times as much from 4.0.
+const TURNED_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
+/// And of those that are: none.
+const STRAIGHT_RAD: f64 = 1e-7;
 
 /// The data and what is known beforehand.
 #[derive(Debug, Clone, Copy)]

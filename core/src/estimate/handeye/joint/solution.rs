@@ -49,9 +49,9 @@ pub struct JointSolution {
     pub field: Option<RobotField>,
     /// Minus twice the log of the restricted likelihood of the noise levels; `None` when these were given.
     pub deviance: Option<f64>,
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale,
-    /// errors of depths, joints, slopes of the field]`, metres, radians, pixels; right perturbations. It includes the robot's noise and the uncertainty of every other
-    /// unknown, that of estimated noise levels too.
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, errors of
+    /// depths, joints, slopes of the field]`, metres, radians, pixels; right perturbations. It includes the robot's noise
+    /// and the uncertainty of every other unknown, that of estimated noise levels too.
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
     pub small_sample: SmallSample,

@@ -26,20 +26,15 @@ use crate::geometry::view_equations::{DepthBias, PredictedDepths};
 use crate::progress::CancelToken;
 use crate::targets::depth_plane::{DepthPlane, are_of_right_size};
 
-/// Views with depths that tell five errors of them, with as many numbers to spare for their noise as they take.
+/// Views with depths that tell five errors of them, with thirteen numbers to spare for their noise.
 pub const FEWEST: usize = 6;
-/// Standard deviation of the tilt of depths that are not measured along the lens, about either axis, radians: 0.3°, what a mounting
-/// of two sensors is off by. It has to be of the right order only: three times as much changes which model is likelier where the tilt
-/// is known to a twentieth of it, and is between three and three and a half of its standard deviations.
-pub const TURNED_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
-/// And of those that are: none.
-const STRAIGHT_RAD: f64 = 1e-7;
 /// Least standard deviation of depths, metres: what a 32-bit float resolves in some metres.
 const LEAST_M: f64 = 1e-6;
 /// Where the level is looked for, as a factor of the scatter of the depths about the estimate without them: some of that is the
 /// estimate's own error.
 const RANGE: (f64, f64) = (0.05, 2.0);
-/// Levels that are tried: the last two are a fifth apart, and thirty numbers tell a level to an eighth.
+/// Levels that are tried: the range is then down to a third of a logarithm, its last two a twelfth apart, and thirty numbers tell a
+/// level to an eighth.
 const TRIED: usize = 7;
 
 /// An estimate with depths.
@@ -88,8 +83,8 @@ pub fn with_depths(
         return Ok(None);
     }
     let Some(scatter_m) = scatter_m(problem, without) else { return Ok(None) };
-    let model = |tilt_sigma_rad| likeliest(problem, without, (tilt_sigma_rad, scatter_m, views), cancel);
-    let (Some(straight), Some(turned)) = (model(STRAIGHT_RAD)?, model(TURNED_RAD)?) else { return Ok(None) };
+    let model = |turned| likeliest(problem, without, (turned, scatter_m, views), cancel);
+    let (Some(straight), Some(turned)) = (model(false)?, model(true)?) else { return Ok(None) };
     let open = (turned.solution.depth, turned.solution.depth_covariance());
     let [answer, other] = if straight.unlikely <= turned.unlikely { [straight, turned] } else { [turned, straight] };
     let probability = (1.0 + (0.5 * (other.unlikely - answer.unlikely)).exp()).recip();
@@ -111,19 +106,19 @@ struct Model {
 fn likeliest(
     problem: &JointProblem<'_>,
     without: &JointSolution,
-    (tilt_sigma_rad, scatter_m, views): (f64, f64, usize),
+    (turned, scatter_m, views): (bool, f64, usize),
     cancel: &CancelToken,
 ) -> Result<Option<Model>, HandEyeError> {
     let free = Free { depth: true, ..without.free };
     let mut best: Option<Model> = None;
     let unlikely = |level_m: f64| -> Result<f64, HandEyeError> {
-        let weight = DepthWeight { px_per_m: without.noise.corner_px / level_m, tilt_sigma_rad };
+        let weight = DepthWeight { px_per_m: without.noise.corner_px / level_m, turned };
         let with = JointProblem { free, depth: Some(weight), ..*problem };
         let start = best.as_ref().map_or(without, |near| &near.solution).as_start();
         let Some(solution) = determined(fit(&with, &start, cancel))? else { return Ok(f64::INFINITY) };
         let Some(deviance) = solution.deviance else { return Ok(f64::INFINITY) };
         // The deviance leaves out the normalising terms of what is known beforehand.
-        let unlikely = deviance - 6.0 * views as f64 * weight.px_per_m.ln() + 4.0 * tilt_sigma_rad.ln();
+        let unlikely = deviance - 6.0 * views as f64 * weight.px_per_m.ln() + 4.0 * weight.tilt_sigma_rad().ln();
         if best.as_ref().is_none_or(|best| unlikely < best.unlikely) {
             best = Some(Model { unlikely, weight, solution });
         }
