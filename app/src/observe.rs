@@ -12,7 +12,7 @@ use handeye_core::project::dataset::{Dataset, DatasetError};
 use handeye_core::project::files::image_file::{self, gray_from_rgb};
 use handeye_core::project::session::{CaptureId, CaptureRecord, Session, SessionError, SessionObservations};
 use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::{Corner, Sight};
+use handeye_core::targets::observation::{Corner, Corners, Sight};
 use handeye_core::targets::{AprilTag, Grid, TargetSpec};
 use rayon::prelude::*;
 
@@ -107,7 +107,7 @@ pub fn observe_session(
     let image_of = |index: usize| Ok(Some(gray_from_rgb(&session.load_rgb(&captures[index])?)));
     let names: Vec<&str> = captures.iter().map(|capture| capture.image.as_str()).collect();
     let corners = corners_of(&names, image_of, target, progress, cancel)?;
-    let sight = |(capture, corners): (&CaptureRecord, Option<Vec<Corner>>)| {
+    let sight = |(capture, corners): (&CaptureRecord, Option<Corners>)| {
         let corners = corners?;
         let depth = depth_plane(&session.folder, capture, image_size, &corners, target);
         Some((capture.id, Sight { corners, depth }))
@@ -141,7 +141,7 @@ pub fn observe_images(
     target: &TargetSpec,
     progress: Progress<'_>,
     cancel: &CancelToken,
-) -> Result<Vec<Option<Vec<Corner>>>, ObserveError> {
+) -> Result<Vec<Option<Corners>>, ObserveError> {
     let names: Vec<String> = images.iter().map(|image| image.display().to_string()).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     corners_of(&names, |index| Ok(image_file::load_gray(&images[index]).ok()), target, progress, cancel)
@@ -202,7 +202,7 @@ fn corners_of(
     target: &TargetSpec,
     progress: Progress<'_>,
     cancel: &CancelToken,
-) -> Result<Vec<Option<Vec<Corner>>>, ObserveError> {
+) -> Result<Vec<Option<Corners>>, ObserveError> {
     let options = DetectOptions::thorough().cancelled_by(cancel);
     let failed = |index: usize, source| match source {
         VisionError::Cancelled => ObserveError::Cancelled,
@@ -229,13 +229,13 @@ fn corners_of(
 /// What one look at an image gave.
 enum Look {
     NoImage,
-    Found(Vec<Corner>),
+    Found(Corners),
     /// The target was not found; the sides of the largest chessboard in sight.
     Missed(Option<(usize, usize)>),
 }
 
 impl Look {
-    fn corners(self) -> Option<Vec<Corner>> {
+    fn corners(self) -> Option<Corners> {
         if let Self::Found(corners) = self { Some(corners) } else { None }
     }
 }
@@ -298,7 +298,7 @@ mod tests {
     fn a_board_with_a_column_more_is_named_although_some_images_hide_it() {
         let grid = Grid { columns: 9, rows: 7, square_m: 0.02 };
         let looks = |found: usize, other: usize, nothing: usize| -> Vec<Look> {
-            let found = (0..found).map(|_| Look::Found(Vec::new()));
+            let found = (0..found).map(|_| Look::Found(Corners::default()));
             let other = (0..other).map(|_| Look::Missed(Some((10, 7))));
             found.chain(other).chain((0..nothing).map(|_| Look::Missed(None))).collect()
         };

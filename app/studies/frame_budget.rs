@@ -214,7 +214,10 @@ fn thousand_views(app: &mut App) {
         let base_from_tip = base_from_target * camera_from_target.inverse() * tip_from_camera.inverse();
         document.captures.push(CaptureRecord::new(CaptureId(n), format!("images/{n:04}.png"), base_from_tip));
         let thumbnail = Arc::new(RgbImage::new(160, 120));
-        seen.push((CaptureId(n), Observed { corners: Some(corners), depth: None, image_size: (640, 480), thumbnail }));
+        seen.push((
+            CaptureId(n),
+            Observed { corners: Some(corners.into()), depth: None, image_size: (640, 480), thumbnail },
+        ));
     }
     let state = SessionState { folder: None, document: Arc::new(document), undo: None, redo: None };
     app.absorb(Event::Document(Box::new(state)));

@@ -16,7 +16,7 @@ use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView
 use handeye_core::geometry::camera::Distortion;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::progress::CancelToken;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Corners};
 use handeye_core::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2};
 
@@ -94,7 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cancel = CancelToken::default();
     let (found, seconds) =
         timed(repeats, || solve(&seen, &observations.target, observations.image_size, &Options::new(model), &cancel))?;
-    let corners: Vec<&[Corner]> = observations.views.iter().filter_map(|v| v.corners.as_deref()).collect();
+    let corners: Vec<&Corners> = observations.views.iter().filter_map(|v| v.corners.as_ref()).collect();
     let options = Options { bend: Bend::IfShown, ..Options::new(model) };
     let (target, size) = (&observations.target, observations.image_size);
     let (_, screened) = timed(repeats, || solve_screened(&corners, target, size, &options, false, &cancel))?;

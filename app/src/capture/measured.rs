@@ -10,7 +10,7 @@ use handeye_core::image::{RgbImage, imageops};
 use handeye_core::project::session::{Capture, CaptureId, Role, SessionError, Store};
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::Corners;
 
 use crate::model::CapturePurpose;
 
@@ -44,7 +44,7 @@ pub struct Measured {
     /// `None` below three images in which the quick search found the board.
     pub corner_noise_px: Option<f64>,
     /// The board's points in the mean image.
-    pub corners: Vec<Corner>,
+    pub corners: Corners,
     /// The plane of the target by its depths.
     pub depth_plane: Option<DepthPlane>,
     /// Name of the pose, from the request.

@@ -8,7 +8,7 @@ use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::TargetSpec;
 use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Corners};
 
 use super::refusal::{self, Why};
 use super::{CaptureRequest, Measured, thumbnail};
@@ -113,7 +113,7 @@ impl Sequence {
     fn measured(
         &self,
         taken: Taken,
-        corners: Vec<Corner>,
+        corners: Corners,
         (base_from_tip, last): &(Pose<Base, Tip>, FrameInfo),
     ) -> Measured {
         let Taken { rgb, depth, frames, settled_s, corner_noise_px } = taken;

@@ -3,7 +3,7 @@
 use handeye_core::capture::Wait;
 use handeye_core::detect::VisionError;
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::Corners;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
@@ -14,7 +14,7 @@ pub struct LiveDetection {
     /// Which frame.
     pub frame: u64,
     /// The corners; `None` when the board was not found.
-    pub corners: Option<Vec<Corner>>,
+    pub corners: Option<Corners>,
     /// The board's pose with the intrinsics at hand.
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Where the tip was, where that is known.

@@ -172,7 +172,7 @@ impl Solution {
         let verifying = verification.iter().map(|(id, view)| (id, Some(view.corners.clone()), view.depth));
         for (id, corners, depth) in fitted.chain(verifying) {
             let observed = Observed {
-                corners: corners.map(|corners| corners.to_vec()),
+                corners,
                 depth,
                 image_size: observations.image_size,
                 // Nobody looks at small copies here.

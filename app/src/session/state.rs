@@ -7,7 +7,7 @@ use handeye_core::geometry::arm::JointValues;
 use handeye_core::image::RgbImage;
 use handeye_core::project::session::{CaptureId, Document, Edit};
 use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::Corners;
 use serde::{Deserialize, Serialize};
 
 use crate::capture::state::CapturePurpose;
@@ -48,7 +48,7 @@ pub struct RecentSession {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observed {
     /// The corners; `None` when the board is not found.
-    pub corners: Option<Vec<Corner>>,
+    pub corners: Option<Corners>,
     /// The plane of the board by the depths of the image; `None` where none were measured.
     pub depth: Option<DepthPlane>,
     /// Width and height of the image in pixels.

@@ -7,7 +7,7 @@ use handeye_core::estimate::uncertainty::quality::TipBox;
 use handeye_core::estimate::{Method, Options};
 use handeye_core::progress::Stage;
 use handeye_core::project::session::{CaptureId, Document, SessionObservations};
-use handeye_core::targets::observation::{Corner, Sight};
+use handeye_core::targets::observation::{Corners, Sight};
 
 use super::question::Question;
 use crate::app::App;
@@ -89,7 +89,7 @@ impl App {
         self.desk.solve(job);
     }
 
-    pub(crate) fn corners(&self, id: CaptureId) -> Option<&Vec<Corner>> {
+    pub(crate) fn corners(&self, id: CaptureId) -> Option<&Corners> {
         self.model.observed(id)?.corners.as_ref()
     }
 

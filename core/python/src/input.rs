@@ -8,7 +8,7 @@ use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_core::nalgebra::Vector2;
 use handeye_core::project::dataset::Dataset;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Corners};
 use handeye_core::targets::{Grid, TargetSpec};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -148,7 +148,7 @@ fn view_corners(
     (numbers, pixels): &CornerArrays,
     target: &TargetSpec,
     (width, height): (u32, u32),
-) -> Result<Vec<Corner>, String> {
+) -> Result<Corners, String> {
     let pixels = doubles(pixels);
     let (pixels, _none) = pixels.as_chunks::<2>();
     let (all, grid) = (target.len(), target.grid());
@@ -192,7 +192,7 @@ fn view_corners(
         corners.push(Corner::new(index, Vector2::new(*u, *v)));
     }
     corners.sort_by_key(|corner| corner.index);
-    Ok(corners)
+    Ok(corners.into())
 }
 
 /// All points of a target (JSON) as doubles x, y, z in metres.

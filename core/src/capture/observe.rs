@@ -7,13 +7,13 @@ use crate::detect::{self, DetectOptions, VisionError};
 use crate::progress::CancelToken;
 use crate::project::files::image_file::gray_from_rgb;
 use crate::targets::TargetSpec;
-use crate::targets::observation::Corner;
+use crate::targets::observation::Corners;
 
 /// The board in an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     /// Its points in sight.
-    pub corners: Vec<Corner>,
+    pub corners: Corners,
     /// How blurred it is; `None` for a board without straight edges, or too small to tell.
     pub blur: Option<EdgeBlur>,
 }

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{DetectOptions, VisionError, detect, detect_with};
 use crate::geometry::camera::Intrinsics;
 use crate::progress::CancelToken;
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 use crate::targets::{Grid, TargetSpec};
 use crate::testing::Scene;
 use crate::testing::looking_at;
@@ -21,7 +21,7 @@ fn scene(columns: usize, rows: usize, angles: [f64; 3]) -> Scene {
     Scene::new(camera, grid, pose)
 }
 
-fn found(scene: &Scene) -> Vec<Corner> {
+fn found(scene: &Scene) -> Corners {
     let target = TargetSpec::Chessboard(scene.grid());
     let corners = detect_with(&scene.render(1), &target, &DetectOptions::live()).expect("searches").expect("found");
     assert!(corners.iter().enumerate().all(|(i, c)| c.index == i));

@@ -8,7 +8,7 @@ use super::markers::{april, charuco};
 use super::options::{DetectOptions, check};
 use super::order::Ordered;
 use super::{VisionError, checkerboard, circles};
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 use crate::targets::{Grid, TargetSpec};
 
 /// An image with fewer pixels than this per point cannot show the target: squares of less than 3 px are not separated.
@@ -18,7 +18,7 @@ const MIN_SQUARE_PX: u32 = 3;
 ///
 /// # Errors
 /// As [`detect_with`].
-pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Vec<Corner>>, VisionError> {
+pub fn detect(image: &GrayImage, target: &TargetSpec) -> Result<Option<Corners>, VisionError> {
     detect_with(image, target, &DetectOptions::default())
 }
 
@@ -49,23 +49,26 @@ pub fn detect_with(
     image: &GrayImage,
     target: &TargetSpec,
     options: &DetectOptions,
-) -> Result<Option<Vec<Corner>>, VisionError> {
+) -> Result<Option<Corners>, VisionError> {
     check(image, target)?;
     let DetectOptions { effort, cancel } = options;
     go_on(cancel)?;
     let effort = *effort;
+    let found = |corners: Option<Vec<Corner>>| Ok(corners.map(Corners::from));
     match target {
         TargetSpec::Chessboard(grid) if fits(image, grid) => {
-            Ok(checkerboard::find(image, grid, cancel)?.as_ref().map(corners))
+            Ok(checkerboard::find(image, grid, cancel)?.as_ref().map(Ordered::corners))
         }
         TargetSpec::Circles(grid) if fits(image, grid) => {
-            Ok(circles::find(image, grid, effort, cancel)?.as_ref().map(corners))
+            Ok(circles::find(image, grid, effort, cancel)?.as_ref().map(Ordered::corners))
         }
-        TargetSpec::AsymmetricCircles(grid) if fits(image, grid) => asymmetric::find(image, grid, effort, cancel),
+        TargetSpec::AsymmetricCircles(grid) if fits(image, grid) => {
+            found(asymmetric::find(image, grid, effort, cancel)?)
+        }
         TargetSpec::Chessboard(_) | TargetSpec::Circles(_) | TargetSpec::AsymmetricCircles(_) => Ok(None),
-        TargetSpec::Charuco(board) => charuco::find(image, board, effort),
-        TargetSpec::AprilGrid(board) => april::find(image, board, effort),
-        TargetSpec::AprilTag(tag) => april::find(image, &tag.alone(), effort),
+        TargetSpec::Charuco(board) => found(charuco::find(image, board, effort)?),
+        TargetSpec::AprilGrid(board) => found(april::find(image, board, effort)?),
+        TargetSpec::AprilTag(tag) => found(april::find(image, &tag.alone(), effort)?),
     }
 }
 
@@ -75,9 +78,4 @@ fn fits(image: &GrayImage, grid: &Grid) -> bool {
     let (columns, rows) = (grid.columns, grid.rows);
     columns.min(rows) < (width.min(height) / MIN_SQUARE_PX) as usize
         && columns.max(rows) < (width.max(height) / MIN_SQUARE_PX * 2) as usize
-}
-
-fn corners(order: &Ordered) -> Vec<Corner> {
-    let all = order.points.iter().zip(&order.covariances_px2).enumerate();
-    all.map(|(index, (&px, &covariance_px2))| Corner { index, px, covariance_px2 }).collect()
 }

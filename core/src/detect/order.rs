@@ -4,9 +4,11 @@
 //! points into the board. Of the orders left (two, or four for a square grid) the caller's preference decides, and
 //! where that does not, the one whose x axis points most to the right in the image.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::targets::Grid;
+use crate::targets::corner_covariance::CornerCovariance;
+use crate::targets::observation::{Corner, Corners};
 
 /// Points of a grid in one order: `points[row * columns + column]`.
 #[derive(Debug, Clone)]
@@ -14,18 +16,46 @@ pub(super) struct Ordered {
     pub points: Vec<Vector2<f64>>,
     /// How well each point is known, squared pixels; `None` where that is not known.
     pub covariances_px2: Vec<Option<Matrix2<f64>>>,
+    /// The covariance of x and y of each point in turn, where they do not err independently.
+    pub together_px2: Option<DMatrix<f64>>,
     pub columns: usize,
 }
 
 impl Ordered {
     pub fn new(points: Vec<Vector2<f64>>, grid: &Grid) -> Self {
-        Self { covariances_px2: vec![None; points.len()], points, columns: grid.columns }
+        Self { covariances_px2: vec![None; points.len()], together_px2: None, points, columns: grid.columns }
+    }
+
+    /// Of points that do not err independently.
+    pub fn together(points: Vec<Vector2<f64>>, covariance_px2: DMatrix<f64>, columns: usize) -> Self {
+        let own = |i| {
+            let block: Matrix2<f64> = covariance_px2.fixed_view::<2, 2>(2 * i, 2 * i).into_owned();
+            Some(0.5 * (block + block.transpose()))
+        };
+        Self {
+            covariances_px2: (0..points.len()).map(own).collect(),
+            together_px2: Some(covariance_px2),
+            points,
+            columns,
+        }
+    }
+
+    /// As the points of a target, numbered in this order.
+    pub fn corners(&self) -> Corners {
+        let all = self.points.iter().zip(&self.covariances_px2).enumerate();
+        let corners = all.map(|(index, (&px, &covariance_px2))| Corner { index, px, covariance_px2 }).collect();
+        Corners::together(corners, self.together_px2.as_ref().and_then(CornerCovariance::new))
     }
 
     /// The points in another order: `place` says where each is taken from.
     fn rearranged(&self, columns: usize, place: impl Iterator<Item = usize> + Clone) -> Self {
+        let together = |all: &DMatrix<f64>| {
+            let numbers: Vec<usize> = place.clone().flat_map(|i| [2 * i, 2 * i + 1]).collect();
+            all.select_rows(&numbers).select_columns(&numbers)
+        };
         Self {
             points: place.clone().map(|i| self.points[i]).collect(),
+            together_px2: self.together_px2.as_ref().map(together),
             covariances_px2: place.map(|i| self.covariances_px2[i]).collect(),
             columns,
         }

@@ -16,7 +16,7 @@ use super::bridge_for_tests::{camera_matrix, coefficients, isometry, numbers, to
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::planar_pose::refine::refine;
 use crate::geometry::planar_pose::{PlanarPose, Solution, solve};
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{ViewInput, Whitener};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
 use crate::targets::{Grid, TargetSpec};
@@ -113,7 +113,14 @@ impl Case {
     fn minima(&self, starts: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
         let board = BoardPoints::new(&self.target.points());
         let (shape, corners) = (&BoardShape::FLAT, &self.corners);
-        let seen = ViewInput { intrinsics: &self.lens, board: &board, shape, corners, sqrt_weights: &[], depths: None };
+        let seen = ViewInput {
+            intrinsics: &self.lens,
+            board: &board,
+            shape,
+            corners,
+            whitener: &Whitener::Alike,
+            depths: None,
+        };
         let mut minima: Vec<_> = starts.iter().filter_map(|start| refine(&seen, start, STEPS)).collect();
         minima.sort_by(|a, b| a.squared_px.total_cmp(&b.squared_px));
         minima.dedup_by(|b, a| a.pose.rotation.angle_to(&b.pose.rotation) < SAME_RAD);

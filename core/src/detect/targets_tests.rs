@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::{VisionError, charuco_layout, detect};
 use crate::geometry::camera::{Distortion, Intrinsics};
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 use crate::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
 use crate::testing::{Scene, looking_at_point};
 
@@ -54,7 +54,7 @@ fn photo_of(
 /// Tilt, azimuth and roll: straight, tilted either way, turned by any angle.
 const POSES: [[f64; 3]; 4] = [[0.0, 0.0, 0.1], [0.6, 0.4, -0.7], [0.5, 2.3, 1.9], [0.7, 4.0, 3.1]];
 
-fn found(image: &GrayImage, target: &TargetSpec) -> Vec<Corner> {
+fn found(image: &GrayImage, target: &TargetSpec) -> Corners {
     let corners = detect(image, target).expect("searches").unwrap_or_else(|| panic!("{target}: not found"));
     assert!(corners.windows(2).all(|pair| pair[0].index < pair[1].index), "{target}: not ascending");
     corners
@@ -233,7 +233,7 @@ fn the_stated_covariance_is_about_what_the_corners_scatter() {
         let (mut sum, mut count) = (0.0, 0.0);
         let truth = photo.truth();
         for seed in 0..3 {
-            for corner in found(&photo.render(seed), &target) {
+            for corner in &found(&photo.render(seed), &target) {
                 let off = corner.px - truth[corner.index];
                 let covariance = corner.covariance_px2.expect("stated");
                 sum += (covariance.try_inverse().expect("regular") * off).dot(&off) / 2.0;

@@ -1,7 +1,5 @@
 //! The camera, and the target's pose in every view that goes with it.
 
-use std::borrow::Cow;
-
 use nalgebra::Vector2;
 
 use super::{CalibrateError, CameraFit, CameraKnowledge, Observations};
@@ -13,10 +11,10 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::geometry::planar_pose::{self, PlanarPose, Solution};
 use crate::geometry::statistics::median;
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{ViewInput, Whitener};
 use crate::progress::{Stage, Work};
 use crate::targets::bent::{BoardPoints, BoardShape};
-use crate::targets::observation::Corner;
+use crate::targets::observation::Corners;
 
 /// Camera and target poses.
 pub struct Lens {
@@ -47,7 +45,7 @@ impl Lens {
             CameraKnowledge::Fixed(intrinsics) => Self::given(intrinsics, observations, seen, work),
             CameraKnowledge::Estimate { model, start } => {
                 work.report(Stage::Intrinsics, 0, 1);
-                let views: Vec<&[Corner]> = seen.iter().map(|s| &**s.corners).collect();
+                let views: Vec<&Corners> = seen.iter().map(|s| s.corners).collect();
                 let options = Options { start, bend: Bend::IfShown, ..Options::new(model) };
                 let (target, size) = (&observations.target, observations.image_size);
                 let screened = intrinsics::solve_screened(&views, target, size, &options, keep_outliers, work.cancel);
@@ -110,7 +108,7 @@ impl Lens {
     }
 
     /// The corners of a view that the camera was found from.
-    pub fn corners_left<'a>(&self, view: usize, corners: &'a [Corner]) -> Cow<'a, [Corner]> {
+    pub fn corners_left(&self, view: usize, corners: &Corners) -> Corners {
         without(corners, &self.aside[view])
     }
 }
@@ -144,11 +142,12 @@ fn alternatives(
     aside: &[Vec<usize>],
 ) -> Vec<Option<Pose<Camera, Target>>> {
     let board = BoardPoints::new(&observations.target.points());
-    let kept: Vec<Cow<'_, [Corner]>> = seen.iter().zip(aside).map(|(s, aside)| without(s.corners, aside)).collect();
+    let kept: Vec<Corners> = seen.iter().zip(aside).map(|(s, aside)| without(s.corners, aside)).collect();
     let poses: Vec<PlanarPose> = (kept.iter().zip(&found.camera_from_target).zip(&found.rms_px).zip(&found.mirrored))
         .map(|(((corners, pose), rms_px), mirrored)| {
             let (intrinsics, shape) = (&found.intrinsics, &found.shape);
-            let view = ViewInput { intrinsics, board: &board, shape, corners, sqrt_weights: &[], depths: None };
+            let view =
+                ViewInput { intrinsics, board: &board, shape, corners, whitener: &Whitener::Alike, depths: None };
             let best = Solution { camera_from_target: *pose, rms_px: *rms_px };
             PlanarPose { best, alternative: mirrored.and_then(|near| planar_pose::other(&view, &best, &near)) }
         })

@@ -43,7 +43,7 @@ use crate::progress::{Stage, Work};
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardShape;
 use crate::targets::depth_plane::DepthPlane;
-use crate::targets::observation::{Corner, Corners, View};
+use crate::targets::observation::{Corners, View};
 
 /// What was observed, from a dataset folder, a session or a live capture.
 #[derive(Debug, Clone)]
@@ -81,11 +81,11 @@ pub struct ObservedView {
 
 impl ObservedView {
     /// A view that takes part, of a robot whose joint angles are not known.
-    pub fn new(name: impl Into<String>, base_from_tip: Option<Pose<Base, Tip>>, corners: Option<Vec<Corner>>) -> Self {
+    pub fn new(name: impl Into<String>, base_from_tip: Option<Pose<Base, Tip>>, corners: Option<Corners>) -> Self {
         Self {
             name: name.into(),
             base_from_tip,
-            corners: corners.map(Corners::from),
+            corners,
             tip_by_joint: Vec::new(),
             depth: None,
             camera_from_target: None,

@@ -26,7 +26,7 @@ use crate::geometry::statistics::better_by_chance;
 use crate::progress::Work;
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
-use crate::targets::observation::View;
+use crate::targets::observation::{Corners, View};
 
 /// A joint estimate and what was decided on the way.
 #[derive(Clone)]
@@ -77,7 +77,7 @@ fn sampled(view: &View) -> View {
     const CORNERS: usize = 6;
     let count = view.corners.len();
     let taken = CORNERS.min(count);
-    let corners = (0..taken).map(|k| view.corners[k * (count - 1) / (taken - 1).max(1)]).collect();
+    let corners: Corners = (0..taken).map(|k| view.corners[k * (count - 1) / (taken - 1).max(1)]).collect();
     View::new(view.name.clone(), view.base_from_tip, corners)
 }
 

@@ -1,9 +1,7 @@
 //! From where a corner is simply wrong: one rule, for the joint estimate and for the camera alone.
 
-use std::borrow::Cow;
-
 use crate::estimate::resolution;
-use crate::targets::observation::Corner;
+use crate::targets::observation::Corners;
 
 /// A corner is wrong beyond so many times the residual that nine in ten corners stay below: seven and a half standard
 /// deviations of Gaussian noise.
@@ -28,9 +26,8 @@ pub(super) fn enough(left: usize, of: usize) -> bool {
 }
 
 /// The corners of a view without some, given by the index of their point, ascending.
-pub(super) fn without<'a>(corners: &'a [Corner], aside: &[usize]) -> Cow<'a, [Corner]> {
-    if aside.is_empty() {
-        return Cow::Borrowed(corners);
-    }
-    corners.iter().filter(|corner| aside.binary_search(&corner.index).is_err()).copied().collect()
+pub(super) fn without(corners: &Corners, aside: &[usize]) -> Corners {
+    let mut left = corners.clone();
+    left.retain(|corner| aside.binary_search(&corner.index).is_err());
+    left
 }

@@ -2,7 +2,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::*;
 use crate::targets::Grid;
-use crate::targets::observation::renumber;
+use crate::targets::observation::{Corner, Corners, renumber};
 use crate::testing::moving_board::{Stage, centre, lens};
 use crate::testing::sessions::BOARD;
 
@@ -83,7 +83,7 @@ fn a_plane_counted_from_another_corner_is_that_of_corners_counted_so() {
         let corner =
             |(i, point): (usize, &Point3<f64>)| Corner::new(i, lens().project(&(board * point)).expect("in front"));
         // Some of them, so that their mean place is not the middle.
-        let mut corners: Vec<Corner> = points.iter().enumerate().map(corner).skip(5).collect();
+        let mut corners: Corners = points.iter().enumerate().map(corner).skip(5).collect();
         let of = |corners: &[Corner]| DepthPlane::new(&depth, (640, 480), corners, &target);
         let mut plane = of(&corners);
         renumber(&mut corners, &mut plane, &target, quarters);

@@ -1,6 +1,7 @@
 //! Calibration targets: what is printed, and where its points are.
 
 pub mod bent;
+pub mod corner_covariance;
 pub mod depth_plane;
 mod dictionary;
 pub mod observation;

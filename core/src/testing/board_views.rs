@@ -103,7 +103,7 @@ impl BoardViews {
             target: TargetSpec::Chessboard(self.grid),
             image_size: (self.camera.width, self.camera.height),
             camera: CameraKnowledge::NOTHING,
-            views: views.map(|(i, corners)| ObservedView::new(format!("{i:04}"), None, Some(corners))).collect(),
+            views: views.map(|(i, corners)| ObservedView::new(format!("{i:04}"), None, Some(corners.into()))).collect(),
         }
     }
 

@@ -284,7 +284,7 @@ impl GuidedCell {
             no_more,
         )?;
         let name = format!("view {}", self.observations.views.len());
-        Some(ObservedView::new(name, Some(*base_from_tip), Some(corners)))
+        Some(ObservedView::new(name, Some(*base_from_tip), Some(corners.into())))
     }
 
     /// How far a calibration puts a point from where it is, metres: where the camera saw the board, which is where the

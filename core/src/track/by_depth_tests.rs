@@ -2,6 +2,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::geometry::frames::Target;
+use crate::targets::observation::Corners;
 use crate::testing::moving_board::{self, FAR_M, Watch, board_at, error};
 use crate::testing::sessions::GRID;
 
@@ -17,7 +18,7 @@ fn measured(change: impl Fn(u32, u32, &mut f32)) -> Option<ByDepth> {
     for (i, metres) in depth.metres.iter_mut().enumerate() {
         change(i as u32 % depth.width, i as u32 / depth.width, metres);
     }
-    let corners: Vec<Corner> = (0..GRID.len())
+    let corners: Corners = (0..GRID.len())
         .map(|index| {
             Corner::new(index, watch.stage.camera.project(&(in_camera * GRID.point(index))).expect("in front"))
         })

@@ -11,9 +11,9 @@ use crate::detect::{DetectOptions, VisionError, detect_with};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::planar_pose;
 use crate::geometry::statistics::median_high;
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{ViewInput, Whitener};
 use crate::targets::bent::{BoardPoints, BoardShape};
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 use crate::targets::{Grid, TargetSpec};
 
 /// Corners that a pose is believed from: twice what it needs, so that one wrong corner shows.
@@ -137,7 +137,7 @@ impl Eye<'_> {
         let usual = median_high(found.iter().map(|(_, corner)| corner.contrast))?;
         found.retain(|(_, corner)| corner.contrast >= MIN_CONTRAST_PART * usual);
         let blur_px = median_high(found.iter().map(|(_, corner)| corner.blur_px));
-        let corners: Vec<Corner> = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
+        let corners: Corners = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
         let board = self.on_hard_edges(self.fitted(&corners, &rough, blur_px)?);
         if board.fit.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
             return None;
@@ -150,7 +150,7 @@ impl Eye<'_> {
         let places = self.places(&expected.camera_from_target, expected.first_dark);
         let square = median_high(places.iter().map(|(_, place)| place.spacing()))?;
         let radius = expected.radius_px.clamp(MIN_RADIUS_PX, (MAX_RADIUS * square).max(MIN_RADIUS_PX));
-        let corners: Vec<Corner> = places
+        let corners: Corners = places
             .iter()
             .filter_map(|(i, place)| {
                 let reach = radius.min((MAX_RADIUS * place.spacing()).max(MIN_RADIUS_PX));
@@ -159,7 +159,7 @@ impl Eye<'_> {
             .collect();
         self.check(&corners)?;
         let floor_px = (ROUGH.0 * square).max(ROUGH.1);
-        let fit = pose::robust(&self.seen(&corners), &expected.camera_from_target, floor_px)?;
+        let fit = pose::robust(&self.seen(), &corners, &expected.camera_from_target, floor_px)?;
         self.check(&fit.corners)?;
         // Most of what looks like corners has to move as one board.
         (2 * fit.corners.len() > corners.len()).then_some(fit.pose)
@@ -171,10 +171,10 @@ impl Eye<'_> {
         (corners.len() >= MIN_CORNERS && pose::spans(points, spread)).then_some(())
     }
 
-    fn fitted(&self, corners: &[Corner], start: &Isometry3<f64>, blur_px: Option<f64>) -> Option<Board> {
+    fn fitted(&self, corners: &Corners, start: &Isometry3<f64>, blur_px: Option<f64>) -> Option<Board> {
         self.check(corners)?;
-        let seen = self.seen(corners);
-        let fit = pose::robust(&seen, start, EXACT_PX)?;
+        let seen = self.seen();
+        let fit = pose::robust(&seen, corners, start, EXACT_PX)?;
         self.check(&fit.corners)?;
         if 2 * fit.corners.len() <= corners.len() {
             return None;
@@ -190,21 +190,25 @@ impl Eye<'_> {
             |index: usize| Some(Corner::new(index, self.camera.project(&(board.fit.pose * self.drawn(index))).ok()?));
         let places: Option<Vec<Corner>> = (0..self.grid().len()).map(place).collect();
         let refined = places.and_then(|places| on_hard_edges(self.image, &places, &self.grid()));
-        let seen = |all: Vec<Corner>| board.fit.corners.iter().map(|corner| all[corner.index]).collect::<Vec<_>>();
-        let fit = refined.map(seen).and_then(|corners| pose::robust(&self.seen(&corners), &board.fit.pose, EXACT_PX));
+        let is_seen = |corner: &Corner| board.fit.corners.iter().any(|seen| seen.index == corner.index);
+        let fit = refined.and_then(|mut corners| {
+            corners.retain(is_seen);
+            pose::robust(&self.seen(), &corners, &board.fit.pose, EXACT_PX)
+        });
         match fit.filter(|fit| self.check(&fit.corners).is_some()) {
             Some(fit) => Board { fit, ..board },
             None => board,
         }
     }
 
-    fn seen<'b>(&'b self, corners: &'b [Corner]) -> ViewInput<'b> {
+    /// What corners are seen through.
+    fn seen(&self) -> ViewInput<'_> {
         ViewInput {
             intrinsics: self.camera,
             board: self.board,
             shape: &BoardShape::FLAT,
-            corners,
-            sqrt_weights: &[],
+            corners: &[],
+            whitener: &Whitener::Alike,
             depths: None,
         }
     }

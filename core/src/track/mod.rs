@@ -34,7 +34,7 @@ use crate::depth::DepthImage;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
 use crate::image::GrayImage;
 use crate::targets::TargetSpec;
-use crate::targets::observation::Corner;
+use crate::targets::observation::Corners;
 use crate::verify::Predictor;
 
 pub use error::TrackError;
@@ -108,7 +108,7 @@ pub enum State {
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardDetection {
     /// Corners that are seen; not all of them where the board is partly hidden.
-    pub corners: Vec<Corner>,
+    pub corners: Corners,
     /// The board in the camera, by PnP.
     pub camera_from_target: Pose<Camera, Target>,
     /// The board in the base, by way of the calibration and the pose of the tip.

@@ -7,8 +7,8 @@ use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::{Minimum, refine};
 use crate::geometry::se3;
 use crate::geometry::statistics::median_high;
-use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
-use crate::targets::observation::Corner;
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput, Whitener};
+use crate::targets::observation::{Corner, Corners};
 
 /// Residuals beyond this many standard deviations have no weight (Tukey's, 95 % efficient at 4.7).
 const TUKEY: f64 = 4.7;
@@ -29,7 +29,7 @@ const SAME_POSE_RAD: f64 = 0.01;
 pub(super) struct Fit {
     pub pose: Isometry3<f64>,
     /// Those of the corners given that are the board's.
-    pub corners: Vec<Corner>,
+    pub corners: Corners,
     /// JᵀJ of these, weighed by what their detector states, by the right perturbation `[t; r]` [px²/m² and px²/rad²].
     pub information: Matrix6<f64>,
     /// Sum of their squared residuals, weighed likewise \[px²\].
@@ -56,16 +56,18 @@ fn sigma_of(lengths: &[f64]) -> f64 {
 }
 
 /// Least squares in which points that do not fit lose their weight, then plain least squares over those that fit.
-/// `floor_px` is a standard deviation that is expected of good points in any case. `None` when it does not converge.
-pub(super) fn robust(seen: &ViewInput<'_>, start: &Isometry3<f64>, floor_px: f64) -> Option<Fit> {
+/// `floor_px` is a standard deviation that is expected of good points in any case. `None` when it does not converge. `seen` is what
+/// the corners are seen through.
+pub(super) fn robust(seen: &ViewInput<'_>, corners: &Corners, start: &Isometry3<f64>, floor_px: f64) -> Option<Fit> {
+    let seen = &ViewInput { corners, ..*seen };
     let mut pose = *start;
     for _ in 0..ROBUST_STEPS {
         let lengths = lengths(seen, &pose)?;
         let reach = TUKEY * sigma_of(&lengths).max(floor_px);
         // The roots of the weights.
         let tukey = |length: &f64| Matrix2::identity() * (1.0 - (length / reach).powi(2)).max(0.0);
-        let sqrt_weights: Vec<Matrix2<f64>> = lengths.iter().map(tukey).collect();
-        let weighted = ViewInput { sqrt_weights: &sqrt_weights, ..*seen };
+        let whitener = Whitener::Each(lengths.iter().map(tukey).collect());
+        let weighted = ViewInput { whitener: &whitener, ..*seen };
         let sums = PoseEquations::new(&weighted, &pose, FreeParameters::default()).ok()?;
         let step: Vector6<f64> = -sums.pose.cholesky()?.solve(&sums.pose_gradient);
         pose *= se3::exp(&step);
@@ -76,15 +78,17 @@ pub(super) fn robust(seen: &ViewInput<'_>, start: &Isometry3<f64>, floor_px: f64
     }
     let lengths = lengths(seen, &pose)?;
     let reach = INLIER * sigma_of(&lengths).max(floor_px);
-    let kept = seen.corners.iter().zip(&lengths).filter(|(_, length)| **length <= reach).map(|(corner, _)| *corner);
-    plain(seen, &pose, kept.collect())
+    let mut kept = corners.clone();
+    let mut lengths = lengths.iter();
+    kept.retain(|_| lengths.next().is_some_and(|length| *length <= reach));
+    plain(seen, &pose, kept)
 }
 
 /// Least squares over some of the corners.
-fn plain(seen: &ViewInput<'_>, start: &Isometry3<f64>, corners: Vec<Corner>) -> Option<Fit> {
-    let weights = CornerWeights::stated(&corners).map(|weights| weights.sqrt_weights(&corners)).unwrap_or_default();
+fn plain(seen: &ViewInput<'_>, start: &Isometry3<f64>, corners: Corners) -> Option<Fit> {
+    let whitener = CornerWeights::stated(&corners).map_or(Whitener::Alike, |weights| weights.whitener(&corners));
     let Minimum { pose, squared_px, information } =
-        refine(&ViewInput { corners: &corners, sqrt_weights: &weights, ..*seen }, start, PLAIN_STEPS)?;
+        refine(&ViewInput { corners: &corners, whitener: &whitener, ..*seen }, start, PLAIN_STEPS)?;
     Some(Fit { pose, corners, information, cost: squared_px })
 }
 

@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::geometry::frames::{Base, Pose, Target};
+use crate::targets::observation::Corners;
 use crate::testing::sessions::normal;
 use crate::track::{BoardDetection, State};
 
@@ -14,7 +15,7 @@ const PERIOD_S: f64 = 1.0 / 15.0;
 fn update(time_s: f64, base_from_target: Pose<Base, Target>) -> Update {
     let covariance = Matrix6::from_diagonal(&Vector6::from(SIGMA.map(|sigma| sigma * sigma)));
     let seen = BoardDetection {
-        corners: Vec::new(),
+        corners: Corners::default(),
         camera_from_target: Pose::identity(),
         base_from_target,
         covariance,

@@ -1,6 +1,6 @@
 //! What of a calibration is needed to predict what the camera sees.
 
-use nalgebra::{DMatrix, Matrix2, Matrix6, Vector2};
+use nalgebra::{DMatrix, Matrix6, Vector2};
 
 use super::VerifyError;
 use crate::estimate::Calibration;
@@ -8,14 +8,15 @@ use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{
     CornerWeights, DepthWeight, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
 };
+use crate::estimate::resolution;
 use crate::estimate::uncertainty::quality;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use crate::geometry::view_equations::{DepthBias, MeasuredDepths, ViewInput};
+use crate::geometry::view_equations::{DepthBias, MeasuredDepths, ViewInput, Whitener};
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::depth_plane::DepthPlane;
-use crate::targets::observation::{Corner, View};
+use crate::targets::observation::{Corner, Corners, View};
 
 /// What of a calibration is needed to predict.
 #[derive(Debug, Clone)]
@@ -69,7 +70,12 @@ impl Predictor {
         let uncertainty = joint.map(|joint| Uncertainty {
             noise: joint.noise,
             weights: joint.weights,
-            depths: joint.depths.as_ref().and_then(|depths| Some((depths.bias, depths.in_fit.weight()?))),
+            depths: joint.depths.as_ref().and_then(|depths| {
+                let weight = depths.in_fit.weight()?;
+                // What no depth camera resolves is no error of a calibration.
+                let px_per_m = weight.px_per_m.min(joint.noise.corner_px / resolution::DEPTH_M);
+                Some((depths.bias, DepthWeight { px_per_m, ..weight }))
+            }),
             free: joint.free,
             covariance: joint.covariance.clone(),
         });
@@ -129,18 +135,18 @@ impl Predictor {
         )
     }
 
-    /// How the corners of an image count, see [`ViewInput::sqrt_weights`].
-    pub(super) fn sqrt_weights(&self, corners: &[Corner]) -> Vec<Matrix2<f64>> {
+    /// How the corners of an image count.
+    pub(super) fn whitener(&self, corners: &Corners) -> Whitener {
         let weights = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.weights);
-        weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(corners))
+        weights.map_or(Whitener::Alike, |weights| weights.whitener(corners))
     }
 
-    /// A view through the calibrated lens, with the whiteners of its corners.
+    /// A view through the calibrated lens, with the whitener of its corners.
     pub(super) fn view_input<'a>(
         &'a self,
         board: &'a BoardPoints,
         (corners, depth): (&'a [Corner], Option<&'a DepthPlane>),
-        sqrt_weights: &'a [Matrix2<f64>],
+        whitener: &'a Whitener,
     ) -> ViewInput<'a> {
         let counted = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.depths.as_ref());
         let depths = counted.zip(depth);
@@ -149,7 +155,7 @@ impl Predictor {
             board,
             shape: &self.shape,
             corners,
-            sqrt_weights,
+            whitener,
             depths: depths.map(|((bias, weight), plane)| MeasuredDepths { plane, bias, px_per_m: weight.px_per_m }),
         }
     }
@@ -162,7 +168,7 @@ impl Predictor {
     pub fn seen(
         &self,
         board: &BoardPoints,
-        (corners, depth): (&[Corner], Option<&DepthPlane>),
+        (corners, depth): (&Corners, Option<&DepthPlane>),
         flat: &Pose<Camera, Target>,
     ) -> Option<Pose<Camera, Target>> {
         if corners.iter().any(|corner| corner.index >= board.len()) {
@@ -170,7 +176,7 @@ impl Predictor {
         }
         let mut start = *flat.isometry();
         start.translation.vector *= self.shape.scale;
-        let sqrt_weights = self.sqrt_weights(corners);
-        quality::weighted_pose_of_view(&self.view_input(board, (corners, depth), &sqrt_weights), &start)
+        let whitener = self.whitener(corners);
+        quality::weighted_pose_of_view(&self.view_input(board, (corners, depth), &whitener), &start)
     }
 }

@@ -107,8 +107,8 @@ impl Sums {
             &calibrated.hand_eye.anchor_from_target(),
         );
         let seen = check.seen_camera_from_target.isometry();
-        let sqrt_weights = calibrated.sqrt_weights(&view.corners);
-        let seen_through = calibrated.view_input(board, (&view.corners, view.depth.as_ref()), &sqrt_weights);
+        let whitener = calibrated.whitener(&view.corners);
+        let seen_through = calibrated.view_input(board, (&view.corners, view.depth.as_ref()), &whitener);
         let equations = PoseEquations::new(&seen_through, seen, self.form).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();
         let by_form = pose_covariance * equations.pose_by_form;

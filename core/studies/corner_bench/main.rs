@@ -45,7 +45,8 @@ pub fn detectors() -> &'static [Detector] {
 
 /// Our own search.
 pub fn native(image: &GrayImage, grid: &Grid) -> Option<Vec<Corner>> {
-    detect_with(image, &TargetSpec::Chessboard(*grid), &DetectOptions::live()).expect("the image can be searched")
+    let found = detect_with(image, &TargetSpec::Chessboard(*grid), &DetectOptions::live());
+    found.expect("the image can be searched").map(|corners| corners.to_vec())
 }
 
 fn main() {

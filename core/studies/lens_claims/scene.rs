@@ -90,7 +90,7 @@ impl Scene {
             let Some(corners) = self.corners(rng, &lens, &camera_from_target) else { continue };
             let noise = Rigid::small(normal3(rng) * self.robot.0, normal3(rng) * self.robot.1);
             let reported = true_tip.times(&waves.at(&true_tip)).times(&noise);
-            views.push(ObservedView::new(format!("{:03}", views.len()), Some(reported.pose()), Some(corners)));
+            views.push(ObservedView::new(format!("{:03}", views.len()), Some(reported.pose()), Some(corners.into())));
         }
         Session { mode: self.mode, lens, hand_eye, views }
     }

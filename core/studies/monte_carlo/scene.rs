@@ -110,7 +110,7 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     for (index, (true_pose, px)) in true_base_from_tip.iter().zip(&pixels).enumerate() {
         let reported = reported(&mut rng, true_pose, noise);
         let seen = |(i, px): (usize, &Vector2<f64>)| Corner::new(i, noisy(&mut rng, px, noise.corner_px));
-        views.push(View::new(format!("view {index}"), reported, px.iter().enumerate().map(seen).collect()));
+        views.push(View::new(format!("view {index}"), reported, px.iter().enumerate().map(seen).collect::<Vec<_>>()));
     }
     if noise.field_m > 0.0 {
         add_field(&mut rng, noise, &mut views);

@@ -45,7 +45,7 @@ fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
     let found = corners(&folder, &dataset.target, detector);
     let by_name = |entry: &str| {
         let file = |path: &str| Path::new(path).file_name().map(|f| f.to_string_lossy().into_owned());
-        found.iter().find(|(image, _)| file(image) == file(entry)).map(|(_, corners)| corners.clone())
+        found.iter().find(|(image, _)| file(image) == file(entry)).map(|(_, corners)| corners.clone().into())
     };
     let views = dataset
         .entries

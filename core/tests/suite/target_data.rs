@@ -8,7 +8,7 @@ use handeye_core::geometry::planar_pose;
 use handeye_core::geometry::statistics::median;
 use handeye_core::image::GrayImage;
 use handeye_core::project::dataset::Dataset;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::Corners;
 use handeye_core::targets::{AprilGrid, AprilTag, Charuco, IdOrder, Layout, TargetSpec};
 use handeye_core::testing::data_folder;
 use nalgebra::Vector2;
@@ -17,7 +17,7 @@ fn load(path: &Path) -> GrayImage {
     handeye_core::image::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8()
 }
 
-fn found(image: &GrayImage, target: &TargetSpec) -> Vec<Corner> {
+fn found(image: &GrayImage, target: &TargetSpec) -> Corners {
     detect(image, target).expect("searches").unwrap_or_else(|| panic!("{target}: not found"))
 }
 

@@ -9,7 +9,7 @@ use handeye_core::estimate::intrinsics::{Options, SeenView, solve};
 use handeye_core::geometry::camera::Distortion;
 use handeye_core::image::GrayImage;
 use handeye_core::progress::CancelToken;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Corners};
 use handeye_core::targets::{Grid, TargetSpec};
 use handeye_core::testing::data_folder;
 use nalgebra::Vector2;
@@ -36,7 +36,7 @@ fn images(folder: &Path) -> Vec<PathBuf> {
 
 struct Found {
     name: String,
-    corners: Option<Vec<Corner>>,
+    corners: Option<Corners>,
     millis: f64,
 }
 
@@ -267,7 +267,7 @@ fn grids_of_dots_begin_at_the_larger_dot_in_every_view() {
     }
     for found in detect_all(&images(&folder.join("images")), &dots(), &DetectOptions::live()) {
         let corners = found.corners.unwrap_or_else(|| panic!("{} missed by the live search", found.name));
-        for corner in corners {
+        for corner in &corners {
             let (column, row) = (corner.index % 10, corner.index / 10);
             // The reference has the larger dot at the end of its y axis: a quarter turn from ours.
             let theirs = reference[&found.name][(9 - column) * 10 + row];

@@ -15,7 +15,7 @@ use handeye_core::image::{Rgb, RgbImage};
 use handeye_core::progress::CancelToken;
 use handeye_core::project::export::{self, ExportInput};
 use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
-use handeye_core::targets::observation::{Corner, View};
+use handeye_core::targets::observation::{Corner, Corners, View};
 use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
 use handeye_core::verify::{self, Predictor};
 use handeye_sim_link::client::cell::ArmKinematics;
@@ -66,12 +66,12 @@ fn base_from_tip(n: u32) -> Pose<Base, Tip> {
 }
 
 /// Corners with a noise of about 0.05 px that is the same in every run.
-fn corners(n: u32) -> Vec<Corner> {
+fn corners(n: u32) -> Corners {
     corners_at(n, &camera_from_target(n))
 }
 
 /// The same of a board elsewhere.
-fn corners_at(n: u32, chain: &Pose<Camera, Target>) -> Vec<Corner> {
+fn corners_at(n: u32, chain: &Pose<Camera, Target>) -> Corners {
     // Independent from corner to corner and from view to view: a pattern would be an error of the print.
     let noise_px = |i: usize, axis: u64| {
         let mut bits = (u64::from(n) << 32 | (i as u64) << 1 | axis).wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -12,7 +12,7 @@ use handeye_core::geometry::planar_pose;
 use handeye_core::image::RgbImage;
 use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
 use handeye_core::targets::TargetSpec;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Corners};
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
 
 use super::convert::{corner_marks, marks, no_lines, outline, pinhole, pixel, transform};
@@ -30,7 +30,7 @@ pub(super) struct Shown {
     /// When it was taken.
     pub taken: Instant,
     /// `None` until they are known, and where the board was not found.
-    pub corners: Option<Vec<Corner>>,
+    pub corners: Option<Corners>,
 }
 
 /// All captures.
@@ -114,7 +114,7 @@ impl Captures {
     }
 
     /// Takes over corners; `None` when there is no such capture now.
-    pub fn observe(&mut self, id: CaptureId, corners: Option<Vec<Corner>>) -> Option<&Shown> {
+    pub fn observe(&mut self, id: CaptureId, corners: Option<Corners>) -> Option<&Shown> {
         let shown = self.shown.get_mut(&id)?;
         shown.corners = corners;
         Some(shown)

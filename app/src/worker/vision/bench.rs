@@ -8,7 +8,7 @@ use handeye_core::depth::DepthImage;
 use handeye_core::geometry::camera::Intrinsics;
 use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
 use handeye_core::image::RgbImage;
-use handeye_core::targets::observation::Corner;
+use handeye_core::targets::observation::{Corner, Corners};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
@@ -225,7 +225,7 @@ impl CellBench {
     }
 
     /// Where the truth says that the corners are, seen from a pose of the tip.
-    pub fn projected(&self, base_from_tip: &Pose<Base, Tip>) -> Vec<Corner> {
+    pub fn projected(&self, base_from_tip: &Pose<Base, Tip>) -> Corners {
         let base_from_target: Pose<Base, Target> = self.truth.base_from_target.expect("published");
         let camera: &Intrinsics = &self.truth.intrinsics;
         let camera_from_target = (*base_from_tip * self.truth.tip_from_camera).inverse() * base_from_target;

@@ -13,7 +13,7 @@ use super::VisionError;
 use super::order::{Ordered, canonical};
 use crate::progress::CancelToken;
 use crate::targets::Grid;
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 
 /// Least share of neighbouring squares that must differ in the direction the pattern asks for.
 const MIN_ALTERNATION: f64 = 0.9;
@@ -52,15 +52,13 @@ pub fn chessboard_in_sight(
 
 /// All corners of a chessboard, found by somebody to a pixel or so, as an image with hard edges has them, each with its
 /// covariance; `None` for softer images, and where corners are missing.
-pub(crate) fn on_hard_edges(image: &GrayImage, corners: &[Corner], grid: &Grid) -> Option<Vec<Corner>> {
+pub(crate) fn on_hard_edges(image: &GrayImage, corners: &[Corner], grid: &Grid) -> Option<Corners> {
     let mut points = vec![None; grid.len()];
     for corner in corners {
         *points.get_mut(corner.index)? = Some(corner.px);
     }
     let found = Ordered::new(points.into_iter().collect::<Option<_>>()?, grid);
-    let refined = hard_edges::refine(image, &found)?;
-    let all = refined.points.iter().zip(&refined.covariances_px2).enumerate();
-    Some(all.map(|(index, (&px, &covariance_px2))| Corner { index, px, covariance_px2 }).collect())
+    Some(hard_edges::refine(image, &found)?.corners())
 }
 
 /// Corners without a fit are refined by OpenCV and stated with [`UNSURE_PX`].

@@ -13,7 +13,7 @@ use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::planar_pose::{self, PlanarPose};
 use crate::geometry::se3::skew;
 use crate::geometry::statistics::median;
-use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput};
+use crate::geometry::view_equations::{FreeParameters, PoseEquations, ViewInput, Whitener};
 use crate::natural_order;
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
@@ -217,7 +217,7 @@ impl SessionViews {
                 board: &points,
                 shape: &BoardShape::FLAT,
                 corners: &fit.corners,
-                sqrt_weights: &[],
+                whitener: &Whitener::Alike,
                 depths: None,
             };
             let Ok(equations) = PoseEquations::new(&seen, &pose, free) else { continue };

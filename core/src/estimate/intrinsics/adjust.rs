@@ -176,7 +176,7 @@ pub(super) fn seen<'a>(
     shape: &'a BoardShape,
     intrinsics: &'a Intrinsics,
 ) -> ViewInput<'a> {
-    ViewInput { intrinsics, board, shape, corners: view.corners, sqrt_weights: view.sqrt_weights, depths: None }
+    ViewInput { intrinsics, board, shape, corners: view.corners, whitener: view.whitener, depths: None }
 }
 
 /// Minimises the cost from `estimate`, which holds the best point found afterwards. Returns the number of steps; `None`

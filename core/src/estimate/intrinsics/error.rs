@@ -19,12 +19,12 @@ pub enum IntrinsicsError {
     #[error(transparent)]
     Corners(#[from] PoseError),
     /// A list of whiteners of another length than that of the corners.
-    #[error("view {view}: there are {sqrt_weights} weights for {corners} corners")]
+    #[error("view {view}: there are {weights} weights for {corners} corners")]
     BadWeights {
         /// Index of the view.
         view: usize,
         /// Whiteners given.
-        sqrt_weights: usize,
+        weights: usize,
         /// Corners given.
         corners: usize,
     },

@@ -165,9 +165,9 @@ pub fn solve(
     }
     for (index, view) in views.iter().enumerate() {
         planar_pose::check_corners(view.corners, target, index)?;
-        let (sqrt_weights, corners) = (view.sqrt_weights.len(), view.corners.len());
-        if sqrt_weights > 0 && sqrt_weights != corners {
-            return Err(IntrinsicsError::BadWeights { view: index, sqrt_weights, corners });
+        let (weights, corners) = (view.whitener.corners(), view.corners.len());
+        if let Some(weights) = weights.filter(|weights| *weights != corners) {
+            return Err(IntrinsicsError::BadWeights { view: index, weights, corners });
         }
     }
     let board = &BoardPoints::new(&target.points());

@@ -1,18 +1,16 @@
 //! The camera without corners that are simply wrong.
 
-use std::borrow::Cow;
-
-use nalgebra::{Isometry3, Matrix2};
+use nalgebra::Isometry3;
 
 use super::{Found, IntrinsicsError, Options, SeenView, solve};
 use crate::estimate::handeye::joint::CornerWeights;
 use crate::estimate::wrong_corners;
 use crate::geometry::planar_pose::refine::refine;
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{ViewInput, Whitener};
 use crate::progress::CancelToken;
 use crate::targets::TargetSpec;
 use crate::targets::bent::BoardPoints;
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 
 /// Rounds of fitting and judging; two are usual where a corner is wrong.
 const ROUNDS: usize = 5;
@@ -43,22 +41,22 @@ pub struct Screened {
 /// # Errors
 /// As [`solve`].
 pub fn solve_screened(
-    views: &[&[Corner]],
+    views: &[&Corners],
     target: &TargetSpec,
     size: (u32, u32),
     options: &Options,
     keep_all: bool,
     cancel: &CancelToken,
 ) -> Result<Screened, IntrinsicsError> {
-    let weights = CornerWeights::stated(views.iter().copied().flatten());
-    let fit = |views: &[Cow<'_, [Corner]>], options: &Options| {
-        let sqrt_weights: Vec<Vec<Matrix2<f64>>> =
-            views.iter().map(|view| weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(view))).collect();
+    let weights = CornerWeights::stated(views.iter().flat_map(|view| view.iter()));
+    let fit = |views: &[Corners], options: &Options| {
+        let whiteners: Vec<Whitener> =
+            views.iter().map(|view| weights.map_or(Whitener::Alike, |weights| weights.whitener(view))).collect();
         let seen: Vec<SeenView<'_>> =
-            views.iter().zip(&sqrt_weights).map(|(corners, sqrt_weights)| SeenView { corners, sqrt_weights }).collect();
+            views.iter().zip(&whiteners).map(|(corners, whitener)| SeenView { corners, whitener }).collect();
         solve(&seen, target, size, options, cancel)
     };
-    let all: Vec<Cow<'_, [Corner]>> = views.iter().map(|view| Cow::Borrowed(*view)).collect();
+    let all: Vec<Corners> = views.iter().copied().cloned().collect();
     let mut now = Screened { found: fit(&all, options)?, aside: vec![Vec::new(); views.len()] };
     if keep_all {
         return Ok(now);
@@ -69,7 +67,7 @@ pub fn solve_screened(
         if aside == now.aside {
             break;
         }
-        let left: Vec<Cow<'_, [Corner]>> =
+        let left: Vec<Corners> =
             views.iter().zip(&aside).map(|(view, aside)| wrong_corners::without(view, aside)).collect();
         let options = Options { start: Some(now.found.intrinsics), ..*options };
         now = Screened { found: fit(&left, &options)?, aside };
@@ -78,7 +76,7 @@ pub fn solve_screened(
 }
 
 /// The wrong corners of every view by a camera, those included that it was found without.
-fn wrong(views: &[&[Corner]], board: &BoardPoints, found: &Found) -> Vec<Vec<usize>> {
+fn wrong(views: &[&Corners], board: &BoardPoints, found: &Found) -> Vec<Vec<usize>> {
     let off = |corner: &Corner, pose: &Isometry3<f64>| {
         let point = pose * board.point(corner.index, &found.shape);
         found.intrinsics.project(&point).map_or(f64::INFINITY, |px| (px - corner.px).norm())
@@ -97,8 +95,8 @@ fn wrong(views: &[&[Corner]], board: &BoardPoints, found: &Found) -> Vec<Vec<usi
             if !wrong_corners::enough(trusted.len(), view.len()) {
                 return Vec::new();
             }
-            let (intrinsics, shape, sqrt_weights) = (&found.intrinsics, &found.shape, &[][..]);
-            let seen = ViewInput { intrinsics, board, shape, corners: &trusted, sqrt_weights, depths: None };
+            let (intrinsics, shape, whitener) = (&found.intrinsics, &found.shape, &Whitener::Alike);
+            let seen = ViewInput { intrinsics, board, shape, corners: &trusted, whitener, depths: None };
             let Some(next) = refine(&seen, &pose, POSE_STEPS) else { break };
             pose = next.pose;
         }

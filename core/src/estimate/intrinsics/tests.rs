@@ -4,6 +4,7 @@ use super::*;
 use crate::geometry::planar_pose::PoseError;
 use crate::geometry::planar_pose::mirror::mirrored;
 use crate::geometry::planar_pose::refine::refine;
+use crate::geometry::view_equations::Whitener;
 use crate::targets::Grid;
 use crate::targets::observation::Corner;
 use crate::testing::BoardViews;
@@ -175,9 +176,10 @@ fn a_corner_of_little_weight_counts_little_and_one_of_none_not_at_all() {
     for view in &mut views {
         view[0].px += Vector2::new(30.0, -20.0);
     }
-    let mut sqrt_weights = vec![Matrix2::identity(); 70];
-    sqrt_weights[0] = Matrix2::zeros();
-    let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView { corners: v, sqrt_weights: &sqrt_weights }).collect();
+    let mut each = vec![Matrix2::identity(); 70];
+    each[0] = Matrix2::zeros();
+    let whitener = Whitener::Each(each);
+    let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView { corners: v, whitener: &whitener }).collect();
     let weighted = solve(&seen, &TARGET, SIZE, &options, &CancelToken::default()).expect("solves");
     let without = solved(&without, &options).expect("solves");
     assert!((weighted.cost / without.cost - 1.0).abs() < 1e-9, "{} {}", weighted.cost, without.cost);
@@ -239,8 +241,8 @@ fn unusable_input_is_refused_by_name() {
     cancel.cancel();
     let seen: Vec<SeenView<'_>> = views.iter().map(|v| SeenView::unweighted(v)).collect();
     assert_eq!(solve(&seen, &TARGET, SIZE, &options, &cancel), Err(IntrinsicsError::Cancelled));
-    let sqrt_weights = [Matrix2::identity()];
-    let uneven = vec![SeenView { corners: &views[0], sqrt_weights: &sqrt_weights }; 3];
+    let whitener = Whitener::Each(vec![Matrix2::identity()]);
+    let uneven = vec![SeenView { corners: &views[0], whitener: &whitener }; 3];
     let error = solve(&uneven, &TARGET, SIZE, &options, &CancelToken::default());
-    assert_eq!(error, Err(IntrinsicsError::BadWeights { view: 0, sqrt_weights: 1, corners: 70 }));
+    assert_eq!(error, Err(IntrinsicsError::BadWeights { view: 0, weights: 1, corners: 70 }));
 }

@@ -27,7 +27,7 @@ use nalgebra::{Isometry3, Matrix2, SymmetricEigen, Vector2};
 
 use crate::geometry::camera::{CameraError, Intrinsics};
 use crate::geometry::frames::{Camera, Pose, Target};
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{ViewInput, Whitener};
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
@@ -201,8 +201,14 @@ pub fn solve(corners: &[Corner], target: &TargetSpec, intrinsics: &Intrinsics) -
     intrinsics.validate()?;
     check_corners(corners, target, 0)?;
     let board = BoardPoints::new(&target.points());
-    let seen =
-        ViewInput { intrinsics, board: &board, shape: &BoardShape::FLAT, corners, sqrt_weights: &[], depths: None };
+    let seen = ViewInput {
+        intrinsics,
+        board: &board,
+        shape: &BoardShape::FLAT,
+        corners,
+        whitener: &Whitener::Alike,
+        depths: None,
+    };
     let pairs = corners.iter().filter_map(|corner| start::pair(&seen, corner).transpose());
     let mut solutions: Vec<Solution> = start::starts(&pairs.collect::<Result<Vec<_>, _>>()?)
         .iter()

@@ -2,16 +2,18 @@
 
 mod depths;
 mod gram;
+mod whitener;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix2, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Matrix6xX, Point3, Vector3, Vector6};
 
 use crate::geometry::camera::{CameraError, Intrinsics, MAX_PARAMETERS};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::Corner;
-use gram::{Gram, Products};
+use gram::Gram;
 
 pub use depths::DepthBias;
 pub(crate) use depths::{MeasuredDepths, PredictedDepths};
+pub use whitener::Whitener;
 
 pub(crate) use gram::Pair;
 
@@ -58,20 +60,19 @@ impl FreeParameters {
     }
 }
 
-/// What one view is seen through: lens and target, and the weights of its corners.
+/// What one view is seen through: lens and target, and how its corners count.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ViewInput<'a> {
     pub intrinsics: &'a Intrinsics,
     pub board: &'a BoardPoints,
     pub shape: &'a BoardShape,
     pub corners: &'a [Corner],
-    /// One matrix `W` per corner, whose residual counts as `W r`; empty where all corners count alike.
-    pub sqrt_weights: &'a [Matrix2<f64>],
+    pub whitener: &'a Whitener,
     /// What depths say of the target's pose, beside the corners; `None` where they do not count.
     pub depths: Option<MeasuredDepths<'a>>,
 }
 
-/// Normal equations of one view, with residuals `r = predicted − measured` in pixels (times the whitener of the corner)
+/// Normal equations of one view, with residuals `r = predicted − measured` in pixels (whitened)
 /// and the pose perturbed as `camera_from_target * exp(xi)`.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseEquations {
@@ -117,26 +118,33 @@ impl PoseEquations {
         free: FreeParameters,
     ) -> Result<Self, CameraError> {
         let rows = Rows::new(seen, camera_from_target, free);
-        let mut gram = Gram::<QUADS>::new();
-        for (i, corner) in seen.corners.iter().enumerate() {
-            rows.fill(i, corner, gram.next())?;
-        }
-        let mut equations = Self::from_products(&gram.finish(), rows.count, seen.corners.len());
+        let mut equations = if matches!(seen.whitener, Whitener::Together { .. }) {
+            let all = rows.all(0, |_, _, _| {})?;
+            let products = all.tr_mul(&all);
+            Self::from_products(|i, j| products[(i, j)], rows.count, seen.corners.len())
+        } else {
+            let mut gram = Gram::<QUADS>::new();
+            for (i, corner) in seen.corners.iter().enumerate() {
+                rows.fill(i, corner, gram.next())?;
+            }
+            let products = gram.finish();
+            Self::from_products(|i, j| products.at(i, j), rows.count, seen.corners.len())
+        };
         if let Some(depths) = &seen.depths {
             depths.add_to(&mut equations, seen, camera_from_target, free);
         }
         Ok(equations)
     }
 
-    fn from_products<const QUADS: usize>(products: &Products<'_, QUADS>, count: usize, corners: usize) -> Self {
+    fn from_products(product: impl Fn(usize, usize) -> f64, count: usize, corners: usize) -> Self {
         let residual = POSE + count;
         Self {
-            pose: Matrix6::from_fn(|i, j| products.at(i, j)),
-            pose_by_form: Matrix6xX::from_fn(count, |i, j| products.at(i, POSE + j)),
-            form: DMatrix::from_fn(count, count, |i, j| products.at(POSE + i, POSE + j)),
-            pose_gradient: Vector6::from_fn(|i, _| products.at(i, residual)),
-            form_gradient: DVector::from_fn(count, |i, _| products.at(POSE + i, residual)),
-            squared_px: products.at(residual, residual),
+            pose: Matrix6::from_fn(&product),
+            pose_by_form: Matrix6xX::from_fn(count, |i, j| product(i, POSE + j)),
+            form: DMatrix::from_fn(count, count, |i, j| product(POSE + i, POSE + j)),
+            pose_gradient: Vector6::from_fn(|i, _| product(i, residual)),
+            form_gradient: DVector::from_fn(count, |i, _| product(POSE + i, residual)),
+            squared_px: product(residual, residual),
             corners,
             depths: 0,
         }
@@ -166,12 +174,30 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// The rows of all corners, whitened: six columns of the pose, those of the form, the residual, and `more` beside them, which
+    /// `fill` is given for every corner, with its rows before they are whitened.
+    pub fn all(&self, more: usize, fill: impl Fn(&Corner, &[Pair], &mut [Pair])) -> Result<DMatrix<f64>, CameraError> {
+        let columns = POSE + self.count + 1;
+        let mut row = vec![Pair::default(); columns + more];
+        let mut all = DMatrix::zeros(2 * self.seen.corners.len(), columns + more);
+        for (i, corner) in self.seen.corners.iter().enumerate() {
+            let (own, beside) = row.split_at_mut(columns);
+            self.fill(i, corner, own)?;
+            beside.fill(Pair::default());
+            fill(corner, own, beside);
+            for (j, [x, y]) in row.iter().enumerate() {
+                (all[(2 * i, j)], all[(2 * i + 1, j)]) = (*x, *y);
+            }
+        }
+        Ok(self.seen.whitener.together(&all).unwrap_or(all))
+    }
+
     /// The two rows of corner `i`: six columns of the pose, those of the form, and the residual; times the whitener of the
-    /// corner.
+    /// corner, where it has one of its own.
     #[expect(clippy::inline_always, reason = "the loop over the corners is the hot one, and has to see it")]
     #[inline(always)]
     pub fn fill(&self, i: usize, corner: &Corner, columns: &mut [Pair]) -> Result<(), CameraError> {
-        let Self { seen: ViewInput { intrinsics, board, shape, sqrt_weights, .. }, rotation, free, .. } = self;
+        let Self { seen: ViewInput { intrinsics, board, shape, whitener, .. }, rotation, free, .. } = self;
         let (lens_count, count) = (self.lens_count, self.count);
         let point = board.point(corner.index, shape);
         let projection = intrinsics.linearise(&(rotation * point.coords + self.translation))?;
@@ -205,7 +231,7 @@ impl<'a> Rows<'a> {
             columns[at..at + DepthBias::COUNT].fill([0.0; 2]);
         }
         columns[POSE + count] = [projection.px[0] - corner.px.x, projection.px[1] - corner.px.y];
-        if let Some(w) = sqrt_weights.get(i) {
+        if let Some(w) = whitener.of(i) {
             for column in &mut columns[..=POSE + count] {
                 let [x, y] = *column;
                 *column = [w.m11 * x + w.m12 * y, w.m21 * x + w.m22 * y];

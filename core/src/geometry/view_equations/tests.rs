@@ -1,7 +1,10 @@
-use nalgebra::{DMatrix, DVector, Point3, Vector2, Vector3};
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 
 use super::*;
 use crate::geometry::camera::Distortion;
+use crate::targets::corner_covariance::CornerCovariance;
 
 const LENSES: [Distortion; 4] = [
     Distortion::None,
@@ -15,12 +18,19 @@ struct View {
     board: BoardPoints,
     shape: BoardShape,
     corners: Vec<Corner>,
-    sqrt_weights: Vec<Matrix2<f64>>,
+    whitener: Whitener,
     pose: Isometry3<f64>,
 }
 
+#[derive(Clone, Copy, PartialEq)]
+enum Count {
+    Alike,
+    Each,
+    Together,
+}
+
 /// Twenty corners a pixel or so off where they should be.
-fn view(distortion: Distortion, weighted: bool) -> View {
+fn view(distortion: Distortion, count: Count) -> View {
     let points: Vec<Point3<f64>> =
         (0..20).map(|i| Point3::new(f64::from(i % 5) * 0.03, f64::from(i / 5) * 0.03, 0.0)).collect();
     let intrinsics = Intrinsics { fy: 575.0, distortion, ..Intrinsics::pinhole(640, 480, 581.0) };
@@ -33,8 +43,18 @@ fn view(distortion: Distortion, weighted: bool) -> View {
         })
         .collect();
     let weight = |i: usize| Matrix2::new(1.0, 0.1 * i as f64, 0.0, 2.0 + (i as f64).sin());
-    let sqrt_weights = if weighted { (0..points.len()).map(weight).collect() } else { Vec::new() };
-    View { intrinsics, board, shape, corners, sqrt_weights, pose }
+    let shared =
+        |i: usize, j: usize| f64::from(u8::from(i == j)) + 0.5 * ((i * j) as f64).cos() / (1.0 + i.abs_diff(j) as f64);
+    let whitener = match count {
+        Count::Alike => Whitener::Alike,
+        Count::Each => Whitener::Each((0..points.len()).map(weight).collect()),
+        Count::Together => {
+            let root = DMatrix::from_fn(2 * points.len(), 2 * points.len(), shared);
+            let covariance = CornerCovariance::new(&(&root * root.transpose())).expect("a covariance");
+            Whitener::Together { covariance: Arc::new(covariance), unit_px2: 2.0 }
+        }
+    };
+    View { intrinsics, board, shape, corners, whitener, pose }
 }
 
 /// All residuals after a step of pose and form.
@@ -57,25 +77,28 @@ fn residuals(view: &View, free: FreeParameters, step: &[f64]) -> DVector<f64> {
     }
     let of = |(i, corner): (usize, &Corner)| {
         let px = intrinsics.project(&(pose * view.board.point(corner.index, &shape))).expect("in front");
-        let sqrt_weight = view.sqrt_weights.get(i).copied().unwrap_or_else(Matrix2::identity);
-        let residual = sqrt_weight * (px - corner.px);
+        let residual = view.whitener.of(i).copied().unwrap_or_else(Matrix2::identity) * (px - corner.px);
         [residual.x, residual.y]
     };
-    DVector::from_vec(view.corners.iter().enumerate().flat_map(of).collect())
+    let all = DVector::from_vec(view.corners.iter().enumerate().flat_map(of).collect());
+    let columns = DMatrix::from_columns(std::slice::from_ref(&all));
+    view.whitener.together(&columns).map_or(all, |whitened| whitened.column(0).into_owned())
 }
 
 #[test]
 fn the_equations_are_those_of_differences_of_the_residuals() {
     const STEP: f64 = 1e-6;
     for distortion in LENSES {
-        for (weighted, lens, warp, scale) in [
-            (false, false, false, false),
-            (false, true, false, false),
-            (true, true, true, true),
-            (true, false, true, false),
-            (false, true, false, true),
+        for (count, lens, warp, scale) in [
+            (Count::Alike, false, false, false),
+            (Count::Alike, true, false, false),
+            (Count::Each, true, true, true),
+            (Count::Each, false, true, false),
+            (Count::Alike, true, false, true),
+            (Count::Together, true, true, true),
+            (Count::Together, false, false, true),
         ] {
-            let view = view(distortion, weighted);
+            let view = view(distortion, count);
             let free = FreeParameters { lens, warp, scale, depth: false };
             let n = 6 + free.count(&view.intrinsics);
             let zero = vec![0.0; n];
@@ -92,8 +115,8 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
                 .collect();
             let jacobian = DMatrix::from_columns(&columns);
             let (normal, gradient) = (jacobian.transpose() * &jacobian, jacobian.transpose() * &r);
-            let View { intrinsics, board, shape, corners, sqrt_weights, pose } = &view;
-            let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights, depths: None };
+            let View { intrinsics, board, shape, corners, whitener, pose } = &view;
+            let seen = ViewInput { intrinsics, board, shape, corners, whitener, depths: None };
             let found = PoseEquations::new(&seen, pose, free).expect("in front");
             assert_eq!(found.corners, 20);
             assert!((found.squared_px / r.norm_squared() - 1.0).abs() < 1e-12);
@@ -120,9 +143,9 @@ fn the_equations_are_those_of_differences_of_the_residuals() {
 
 #[test]
 fn a_target_behind_the_camera_has_no_equations() {
-    let view = view(LENSES[1], false);
-    let View { intrinsics, board, shape, corners, sqrt_weights, .. } = &view;
-    let seen = ViewInput { intrinsics, board, shape, corners, sqrt_weights, depths: None };
+    let view = view(LENSES[1], Count::Alike);
+    let View { intrinsics, board, shape, corners, whitener, .. } = &view;
+    let seen = ViewInput { intrinsics, board, shape, corners, whitener, depths: None };
     let behind = Isometry3::translation(0.0, 0.0, -1.0);
     assert!(PoseEquations::new(&seen, &behind, FreeParameters { lens: true, ..FreeParameters::default() }).is_err());
 }

@@ -2,7 +2,7 @@
 
 use super::{CameraInput, Dataset};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView};
-use crate::targets::observation::Corner;
+use crate::targets::observation::Corners;
 
 impl CameraInput {
     /// What a data set or a session with this table, or without one, knows of its camera.
@@ -20,10 +20,10 @@ impl CameraInput {
 impl Dataset {
     /// What was observed. Where the data set has a corner table, its corners count; elsewhere `detected` gives those of
     /// an entry by its index, `None` when the target was not found in its image.
-    pub fn observations(&self, mut detected: impl FnMut(usize) -> Option<Vec<Corner>>) -> Observations {
+    pub fn observations(&self, mut detected: impl FnMut(usize) -> Option<Corners>) -> Observations {
         let views = self.entries.iter().enumerate().map(|(index, entry)| {
             let corners = match &entry.corners {
-                Some(listed) => Some(listed.clone()).filter(|corners| !corners.is_empty()),
+                Some(listed) => Some(listed.clone().into()).filter(|corners: &Corners| !corners.is_empty()),
                 None => detected(index),
             };
             ObservedView {

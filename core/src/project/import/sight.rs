@@ -12,7 +12,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::Pose;
 use crate::geometry::statistics::median;
 use crate::targets::TargetSpec;
-use crate::targets::observation::Corner;
+use crate::targets::observation::Corners;
 use crate::text;
 use crate::wording::Text;
 
@@ -42,10 +42,10 @@ impl Sight {
         target: TargetSpec,
         image_size: (u32, u32),
         camera: CameraKnowledge,
-        corners: &[Option<Vec<Corner>>],
+        corners: &[Option<Corners>],
     ) -> Result<Self, Text> {
         // The robot is not asked: its poses are what is in doubt.
-        let view = |(index, corners): (usize, &Option<Vec<Corner>>)| {
+        let view = |(index, corners): (usize, &Option<Corners>)| {
             ObservedView::new(index.to_string(), Some(Pose::identity()), corners.clone())
         };
         let views = corners.iter().enumerate().map(view).collect();
@@ -113,9 +113,11 @@ impl Sight {
 ///
 /// # Errors
 /// A sentence, where they are not those of this target.
-pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<Vec<Option<Vec<Corner>>>, Text> {
+pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<Vec<Option<Corners>>, Text> {
     let views = stream.points.as_deref().unwrap_or_default();
-    views.iter().map(|points| points.as_ref().map(|points| corners::numbered(points, target)).transpose()).collect()
+    let numbered =
+        views.iter().map(|points| points.as_ref().map(|points| corners::numbered(points, target)).transpose());
+    numbered.map(|view| Ok(view?.map(Corners::from))).collect()
 }
 
 /// The size of the images that points are from, as a person or the files say it.

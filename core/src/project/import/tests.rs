@@ -49,9 +49,7 @@ pub(super) fn sights(recording: &Recording, session: &Observations) -> Sights {
         let corners: Vec<_> = stream
             .images
             .iter()
-            .map(|image| {
-                session.views[view_of(&recording.root.join(&image.path))].corners.as_deref().map(<[_]>::to_vec)
-            })
+            .map(|image| session.views[view_of(&recording.root.join(&image.path))].corners.clone())
             .collect();
         Sight::of_corners(session.target, session.image_size, CameraKnowledge::Fixed(camera), &corners).ok()
     };
@@ -254,7 +252,7 @@ fn a_file_to_a_pose_in_json_and_yaml_gives_the_same_poses_and_joints() {
 fn pose_pairs_without_images_are_understood_from_their_names_alone() {
     let session = observed(Mode::EyeToHand, 12, 7);
     let CameraKnowledge::Fixed(camera) = session.camera else { panic!("known") };
-    let corners: Vec<_> = session.views.iter().map(|v| v.corners.as_deref().map(<[_]>::to_vec)).collect();
+    let corners: Vec<_> = session.views.iter().map(|v| v.corners.clone()).collect();
     let sight =
         Sight::of_corners(session.target, session.image_size, CameraKnowledge::Fixed(camera), &corners).expect("poses");
     let folder = tempfile::tempdir().expect("a folder");

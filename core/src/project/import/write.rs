@@ -22,7 +22,7 @@ use crate::project::dataset::write::{
 use crate::project::files::atomic_file;
 use crate::project::files::image_file::one_line;
 use crate::project::files::own_folder::{self, DESCRIPTION};
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 use crate::targets::{AprilTag, Dictionary, TargetSpec};
 
 /// Name of the table of the target's poses.
@@ -228,7 +228,7 @@ pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetS
 
 /// Corners that stand for images, and the size of those.
 struct RecordedCorners {
-    views: Vec<Option<Vec<Corner>>>,
+    views: Vec<Option<Corners>>,
     columns: usize,
     size: (u32, u32),
 }

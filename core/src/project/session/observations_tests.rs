@@ -3,11 +3,11 @@ use nalgebra::Vector2;
 use super::*;
 use crate::project::session::tests::{meta, record};
 use crate::project::session::{CaptureRecord, Role};
-use crate::targets::observation::Corner;
+use crate::targets::observation::{Corner, Corners};
 
 /// A corner that tells from which capture it is.
-fn corner_of(id: CaptureId) -> Vec<Corner> {
-    vec![Corner::new(0, Vector2::new(f64::from(id.0), 0.0))]
+fn corner_of(id: CaptureId) -> Corners {
+    vec![Corner::new(0, Vector2::new(f64::from(id.0), 0.0))].into()
 }
 
 #[test]
@@ -36,12 +36,12 @@ fn exclusions_and_verification_captures_are_known_by_their_number_wherever_they_
         [("images/0009.png", false), ("images/0002.png", true), ("images/0001.png", false), ("images/0008.png", true)]
     );
     for (id, view) in seen.captures.iter().zip(&seen.observations.views) {
-        assert_eq!(view.corners, Some(corner_of(*id).into()), "{} has the corners of another capture", view.name);
+        assert_eq!(view.corners, Some(corner_of(*id)), "{} has the corners of another capture", view.name);
         assert_eq!(view.base_from_tip, record(id.0).base_from_tip);
     }
     // Excluded, or without the target, it verifies nothing.
     let verification: Vec<_> = seen.verification.iter().map(|(id, view)| (id.0, view.name.as_str())).collect();
     assert_eq!(verification, [(4, "images/0004.png")]);
-    assert_eq!(seen.verification[0].1.corners, corner_of(CaptureId(4)).into());
+    assert_eq!(seen.verification[0].1.corners, corner_of(CaptureId(4)));
     assert_eq!((seen.observations.mode, seen.observations.image_size), (Some(meta().mode), (24, 16)));
 }

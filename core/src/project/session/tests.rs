@@ -8,7 +8,7 @@ use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::project::dataset::{CameraInput, Dataset};
-use crate::targets::observation::Sight;
+use crate::targets::observation::{Corners, Sight};
 use crate::targets::{Grid, TargetSpec};
 
 pub(super) fn meta() -> SessionMeta {
@@ -149,7 +149,7 @@ fn images_alone_are_a_session_without_a_robot_and_their_data_set_has_those_in_us
 
     let document = Session::open(dir.path()).expect("open").document;
     assert_eq!((&*document, document.mode()), (&**store.document(), None));
-    let seen = document.observations((24, 16), |_| Some(Sight { corners: Vec::new(), depth: None }));
+    let seen = document.observations((24, 16), |_| Some(Sight { corners: Corners::default(), depth: None }));
     assert_eq!((seen.observations.mode, seen.observations.views.len()), (None, 4));
     let data = Dataset::read(dir.path()).unwrap_or_else(|e| panic!("{e}"));
     let names: Vec<&str> = data.entries.iter().map(|entry| entry.name.as_str()).collect();

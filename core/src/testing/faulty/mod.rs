@@ -278,7 +278,7 @@ fn observed(
     let corners = seen(rng, &camera(), camera_from_target.isometry(), &points, noise_px, bend)?;
     Some(ObservedView {
         tip_by_joint: if setup.joints { twists } else { Vec::new() },
-        ..ObservedView::new(format!("{index:03}"), Some(reported), Some(corners))
+        ..ObservedView::new(format!("{index:03}"), Some(reported), Some(corners.into()))
     })
 }
 

@@ -15,7 +15,9 @@
 //!
 //! Sides that pass at the same place within a pixel say the same, and not each something of its own: of a board that is seen
 //! straight, with squares of a whole number of pixels, no number of sides tells where in the pixel it is. What part of a pixel
-//! no side passes is left open in the covariance of every corner ([`Phases`]).
+//! no side passes is left open in the covariance of all corners together ([`Phases`]).
+//!
+//! Corners share the ends of sides, so what is stated is the covariance of all of them.
 //!
 //! The bound: the mean and the covariance of the distribution that all inequalities and that expectation leave;
 //! `docs/maths/hard_edges.md` has how near to it that comes.
@@ -85,7 +87,7 @@ fn refined(image: &GrayImage, found: &Ordered, reach: &Reach, rounds: usize) -> 
     }
     let print_px = PRINT_SQUARES * map.square_px();
     let edges = used.iter().map(|(side, edge, _)| (side.ends.map(|end| end.corner), edge));
-    let Displacements { moved, covariances_px2 } =
+    let Displacements { moved, mut covariance_px2 } =
         together::displacements(edges, &map.smooth_displacements(), print_px, rounds)?;
     if moved.iter().any(|by| by.norm() > FURTHEST_PX) {
         return None;
@@ -96,13 +98,17 @@ fn refined(image: &GrayImage, found: &Ordered, reach: &Reach, rounds: usize) -> 
             phases.add(edge, passages, [a, b].map(|corner| edge.normal.dot(&moved[corner])));
         }
     }
+    // Of all corners together.
     let open_px2 = phases.open_px2();
+    for a in 0..moved.len() {
+        for b in 0..moved.len() {
+            let mut shared = covariance_px2.fixed_view_mut::<2, 2>(2 * a, 2 * b);
+            shared += open_px2;
+        }
+    }
     let place = |(index, by): (usize, &Vector2<f64>)| map.at((index % columns) as f64, (index / columns) as f64) + by;
-    Some(Ordered {
-        points: moved.iter().enumerate().map(place).collect(),
-        covariances_px2: covariances_px2.into_iter().map(|covariance| Some(covariance + open_px2)).collect(),
-        columns,
-    })
+    let points = moved.iter().enumerate().map(place).collect();
+    Some(Ordered::together(points, covariance_px2, columns))
 }
 
 /// Where within a pixel edges pass, −½ to ½, for those that run across rows and those that run across columns.

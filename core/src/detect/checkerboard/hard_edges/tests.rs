@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use image::Luma;
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -144,6 +144,53 @@ fn corners_of_hard_edges_are_found_where_they_were_printed_to_what_is_stated() {
         // A print as bad as expected would be at 1. A better one is stated with too much, and none with too little.
         assert!((0.4..1.15).contains(&relative), "{relative}");
     }
+}
+
+/// A map of the board by all corners, which is what a pose and a lens are found from: by least squares with the covariance of all
+/// corners, and with those of single corners. Who counts the corners as independent counts what they share many times.
+#[test]
+fn a_map_by_all_corners_is_as_good_as_their_covariance_says_and_better_than_by_each_for_itself() {
+    let mut random = ChaCha8Rng::seed_from_u64(10);
+    let (mut together, mut each, mut relative, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for i in 0..24 {
+        // Turned by 1° to 179° against the pixels: of a board along them nobody knows the place.
+        let drawn = Drawn::random(&mut random, 0.02 + f64::from(i % 12) * 0.26, 0.0);
+        let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges");
+        let truth = drawn.truth();
+        // What a homography does to the places of the corners, linear in its eight numbers.
+        let smooth = DMatrix::from_fn(2 * GRID.len(), 8, |row, column| {
+            let [x, y] = [(row / 2 % 10) as f64 / 10.0, (row / 2 / 10) as f64 / 10.0];
+            let at = mapped(&drawn.map, Vector2::new(10.0 * x, 10.0 * y)) / 500.0;
+            let along = [at.x, at.y][row % 2];
+            let of = |axis: usize, value: f64| if row % 2 == axis { value } else { 0.0 };
+            [of(0, 1.0), of(0, at.x), of(0, at.y), of(1, 1.0), of(1, at.x), of(1, at.y), at.x * along, at.y * along]
+                [column]
+        });
+        let off = DMatrix::from_fn(2 * GRID.len(), 1, |row, _| (found.points[row / 2] - truth[row / 2])[row % 2]);
+        let covariance = found.together_px2.expect("stated");
+        let mut alone = DMatrix::zeros(covariance.nrows(), covariance.ncols());
+        for corner in 0..GRID.len() {
+            let own = covariance.fixed_view::<2, 2>(2 * corner, 2 * corner);
+            alone.fixed_view_mut::<2, 2>(2 * corner, 2 * corner).copy_from(&own);
+        }
+        let by = |covariance: &DMatrix<f64>| {
+            let weights = covariance.clone().try_inverse().expect("regular");
+            let information = smooth.tr_mul(&(&weights * &smooth));
+            let numbers = information.clone().try_inverse().expect("regular") * smooth.tr_mul(&(&weights * &off));
+            (information, numbers)
+        };
+        let (information, numbers) = by(&covariance);
+        together += (&smooth * &numbers).norm_squared();
+        each += (&smooth * by(&alone).1).norm_squared();
+        relative += numbers.dot(&(information * &numbers));
+        count += 8.0;
+    }
+    let corners = 2.0 * 24.0 * GRID.len() as f64;
+    let [together, each] = [together, each].map(|sum: f64| (sum / corners).sqrt());
+    let relative = f64::sqrt(relative / count);
+    println!("maps: {together:.4} px by all, {each:.4} px by each, {relative:.3} of what is stated");
+    assert!(together < 0.85 * each, "{together} px by all together, {each} px by each");
+    assert!((0.5..1.15).contains(&relative), "{relative} of what is stated");
 }
 
 /// A finger of a gripper over the outline of the print, at a slope of its own to the last sides.

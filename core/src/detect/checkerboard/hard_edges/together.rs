@@ -22,7 +22,8 @@ const CONTRADICTS: f64 = 25.0;
 /// Displacements of all corners, pixels.
 pub(super) struct Displacements {
     pub moved: Vec<Vector2<f64>>,
-    pub covariances_px2: Vec<Matrix2<f64>>,
+    /// Of x and y of each in turn.
+    pub covariance_px2: DMatrix<f64>,
 }
 
 /// What a side says of the displacements of its ends along its normal, as a Gaussian: precision, and precision times mean.
@@ -66,11 +67,9 @@ pub(super) fn displacements<'a>(
         all = Gaussian::of(&expected, &messages)?;
     }
     let Gaussian { mean, covariance } = all;
-    let of = |i: usize| covariance.fixed_view::<2, 2>(2 * i, 2 * i).into_owned();
-    let covariances_px2: Vec<Matrix2<f64>> = (0..numbers / 2).map(of).map(|c| 0.5 * (c + c.transpose())).collect();
-    let is_sound = |c: &Matrix2<f64>| c.iter().all(|v| v.is_finite()) && c.m11 > 0.0 && c.m22 > 0.0;
+    let is_sound = covariance.iter().all(|v| v.is_finite()) && covariance.diagonal().iter().all(|v| *v > 0.0);
     let moved = (0..numbers / 2).map(|i| Vector2::new(mean[2 * i], mean[2 * i + 1])).collect();
-    covariances_px2.iter().all(is_sound).then_some(Displacements { moved, covariances_px2 })
+    is_sound.then_some(Displacements { moved, covariance_px2: covariance })
 }
 
 /// The message that contradicts all others most, if one does.

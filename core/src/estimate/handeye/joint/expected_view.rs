@@ -18,7 +18,7 @@ use crate::estimate::Calibration;
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use crate::geometry::view_equations::{PoseEquations, ViewInput};
+use crate::geometry::view_equations::{PoseEquations, ViewInput, Whitener};
 use crate::targets::TargetSpec;
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};
@@ -144,7 +144,7 @@ impl ViewModel {
             board: &self.board,
             shape: &self.shape,
             corners: &corners,
-            sqrt_weights: &[],
+            whitener: &Whitener::Alike,
             depths: None,
         };
         let equations = PoseEquations::new(&seen, &chain.camera_from_target, self.free.form()).ok()?;

@@ -247,8 +247,8 @@ fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {
 fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<ViewBlock, HandEyeError> {
     let view = &problem.views[index];
     let chain = state.chain(problem, view, &state.corrections[index]);
-    let sqrt_weights = problem.sqrt_weights(view);
-    let seen = problem.seen(state, view, &sqrt_weights);
+    let whitener = problem.whitener(view);
+    let seen = problem.seen(state, view, &whitener);
     let equations = PoseEquations::new(&seen, &chain.camera_from_target, problem.free.form()).map_err(|_behind| {
         HandEyeError::NoSolution {
             method: METHOD,

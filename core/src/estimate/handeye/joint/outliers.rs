@@ -210,8 +210,8 @@ fn own_pose(
 ) -> Option<(Isometry3<f64>, PoseEquations)> {
     // From PnP with a lens that was a little different, two steps are exact to first order in what is left.
     const STEPS: usize = 2;
-    let sqrt_weights = problem.sqrt_weights(view);
-    let seen = problem.seen(state, view, &sqrt_weights);
+    let whitener = problem.whitener(view);
+    let seen = problem.seen(state, view, &whitener);
     let mut pose = *start.isometry();
     for _ in 0..STEPS {
         let equations = PoseEquations::new(&seen, &pose, FreeParameters::default()).ok()?;

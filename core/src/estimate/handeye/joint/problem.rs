@@ -1,6 +1,6 @@
 //! What the joint estimate is given.
 
-use nalgebra::{DMatrix, Matrix2};
+use nalgebra::DMatrix;
 
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::chain::MAX_JOINTS;
@@ -9,7 +9,7 @@ use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::weights::CornerWeights;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
-use crate::geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput};
+use crate::geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput, Whitener};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::View;
 
@@ -136,19 +136,14 @@ impl<'a> JointProblem<'a> {
         }
     }
 
-    /// A view through the lens of a state, with the whiteners of its corners.
-    pub(super) fn seen<'v>(
-        &'v self,
-        state: &'v State,
-        view: &'v View,
-        sqrt_weights: &'v [Matrix2<f64>],
-    ) -> ViewInput<'v> {
+    /// A view through the lens of a state, with the whitener of its corners.
+    pub(super) fn seen<'v>(&'v self, state: &'v State, view: &'v View, whitener: &'v Whitener) -> ViewInput<'v> {
         ViewInput {
             intrinsics: &state.intrinsics,
             board: self.board,
             shape: &state.shape,
             corners: &view.corners,
-            sqrt_weights,
+            whitener,
             depths: self.depth.zip(view.depth.as_ref()).map(|(weight, plane)| MeasuredDepths {
                 plane,
                 bias: &state.depth,
@@ -157,9 +152,9 @@ impl<'a> JointProblem<'a> {
         }
     }
 
-    /// How the corners of a view count, see [`ViewInput::sqrt_weights`].
-    pub(super) fn sqrt_weights(&self, view: &View) -> Vec<Matrix2<f64>> {
-        self.weights.map_or_else(Vec::new, |weights| weights.sqrt_weights(&view.corners))
+    /// How the corners of a view count.
+    pub(super) fn whitener(&self, view: &View) -> Whitener {
+        self.weights.map_or(Whitener::Alike, |weights| weights.whitener(&view.corners))
     }
 
     /// Number of joint offsets that are estimated: none unless all views know their joints.

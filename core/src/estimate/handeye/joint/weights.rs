@@ -2,11 +2,9 @@
 
 use nalgebra::{Cholesky, Matrix2};
 
-use crate::targets::observation::Corner;
-
-/// The part of the mean variance that every corner has in common, whatever its detector says. A tenth costs one part in a
-/// hundred where the statement is true, and keeps a single corner from counting more than ten typical ones.
-const COMMON: f64 = 0.1;
+use crate::geometry::view_equations::Whitener;
+use crate::targets::corner_covariance::COMMON;
+use crate::targets::observation::{Corner, Corners};
 
 /// Corners weighed by what their detector states: a residual `r` counts as `W r`, so that all have the same noise level.
 ///
@@ -29,9 +27,13 @@ impl CornerWeights {
         (mean_px2.is_finite() && mean_px2 > 0.0).then_some(Self { mean_px2 })
     }
 
-    /// One whitener per corner. A corner whose covariance is none, or is not one, counts like the typical corner.
-    pub fn sqrt_weights(self, corners: &[Corner]) -> Vec<Matrix2<f64>> {
-        corners.iter().map(|corner| self.sqrt_weight(corner).unwrap_or_else(Matrix2::identity)).collect()
+    /// Of the corners of an image. A corner whose covariance is none, or is not one, counts like the typical corner.
+    pub fn whitener(self, corners: &Corners) -> Whitener {
+        if let Some(covariance) = corners.covariance() {
+            return Whitener::Together { covariance: covariance.clone(), unit_px2: self.mean_px2 };
+        }
+        let own = |corner: &Corner| self.sqrt_weight(corner).unwrap_or_else(Matrix2::identity);
+        Whitener::Each(corners.iter().map(own).collect())
     }
 
     fn sqrt_weight(self, corner: &Corner) -> Option<Matrix2<f64>> {
@@ -55,8 +57,8 @@ mod tests {
         };
         let corners = [corner(0.01), corner(0.04)];
         let weights = CornerWeights::stated(&corners).expect("all are stated");
-        let sqrt_weights = weights.sqrt_weights(&corners);
-        let ratio = (sqrt_weights[0][(0, 0)] / sqrt_weights[1][(0, 0)]).powi(2);
+        let Whitener::Each(each) = weights.whitener(&corners.to_vec().into()) else { panic!("they are independent") };
+        let ratio = (each[0][(0, 0)] / each[1][(0, 0)]).powi(2);
         // 0.9 of 0.4 and 1.6 times the mean, and 0.1 for both.
         assert!((ratio - (0.9 * 1.6 + 0.1) / (0.9 * 0.4 + 0.1)).abs() < 1e-12, "{ratio}");
         let plain = Corner::new(0, Vector2::zeros());

@@ -11,7 +11,7 @@ use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use crate::geometry::planar_pose::refine::refine;
-use crate::geometry::view_equations::ViewInput;
+use crate::geometry::view_equations::{ViewInput, Whitener};
 use crate::progress::{Stage, Work};
 use crate::targets::bent::{BoardPoints, BoardShape};
 use crate::targets::observation::{Corner, View};
@@ -172,7 +172,7 @@ pub fn pose_of_view(
     start: &Pose<Camera, Target>,
 ) -> Option<Pose<Camera, Target>> {
     weighted_pose_of_view(
-        &ViewInput { intrinsics, board, shape, corners, sqrt_weights: &[], depths: None },
+        &ViewInput { intrinsics, board, shape, corners, whitener: &Whitener::Alike, depths: None },
         start.isometry(),
     )
 }
