@@ -11,12 +11,12 @@
 //! # use handeye_core::geometry::camera::Intrinsics;
 //! # use handeye_core::geometry::frames::{Base, Pose, Tip};
 //! # use handeye_core::nalgebra::{Isometry3, Vector2, Vector3};
-//! # use handeye_core::targets::observation::Corner;
+//! # use handeye_core::targets::observation::{Corner, Corners};
 //! #
 //! # const TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 9, rows: 6, square_m: 0.025 });
 //! # fn tip_from_camera() -> Isometry3<f64> { Isometry3::new(Vector3::new(0.05, 0.0, 0.08), Vector3::z() * 1.5) }
 //! # /// Twelve views of a board on a table, with corners that are a few hundredths of a pixel off.
-//! # fn recording() -> Vec<(String, Pose<Base, Tip>, Vec<Corner>)> {
+//! # fn recording() -> Vec<(String, Pose<Base, Tip>, Corners)> {
 //! #     let base_from_target = Isometry3::new(Vector3::new(0.5, 0.1, 0.0), Vector3::x() * 3.1);
 //! #     let camera = Intrinsics::pinhole(640, 480, 600.0);
 //! #     let view = |i: usize| {
