@@ -62,6 +62,21 @@ fn result_beside(session: &Path) -> CalibrationResult {
     CalibrationResult::read(&session.join("result.json")).expect("a result beside the session")
 }
 
+fn by_command_line(session: &Path) -> CalibrationResult {
+    let folder = tempfile::tempdir().expect("a folder");
+    let result = folder.path().join("result.json");
+    let status = std::process::Command::new(handeye_tests::handeye_binary())
+        .args(["calibrate", "--quiet"])
+        .arg(session)
+        .arg("--json")
+        .arg(&result)
+        .stdout(std::process::Stdio::null())
+        .status()
+        .expect("handeye runs");
+    assert!(status.success());
+    CalibrationResult::read(&result).expect("a result")
+}
+
 #[test]
 fn ten_poses_are_visited_captured_solved_verified_and_exported() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -144,18 +159,7 @@ fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_comman
     assert_eq!(resolved.result.quality, solved.result.quality);
     assert_eq!(resolved.result.views, solved.result.views);
 
-    let by_command_line = tempfile::tempdir().expect("a folder").path().join("result.json");
-    std::fs::create_dir_all(by_command_line.parent().expect("a parent")).expect("a folder");
-    let status = std::process::Command::new(handeye_tests::handeye_binary())
-        .args(["calibrate", "--quiet"])
-        .arg(&session)
-        .arg("--json")
-        .arg(&by_command_line)
-        .stdout(std::process::Stdio::null())
-        .status()
-        .expect("handeye runs");
-    assert!(status.success());
-    let cli = CalibrationResult::read(&by_command_line).expect("a result");
+    let cli = by_command_line(&session);
     assert_eq!(cli.hand_eye, kept.hand_eye);
     assert_eq!(cli.target, kept.target);
     assert_eq!(cli.intrinsics, kept.intrinsics);
@@ -237,11 +241,7 @@ fn recorded_images_and_poses_are_opened_as_a_session_and_stay_as_they_are() {
     drop(bench);
     // A data set has no depths, and with them the answer is another one.
     std::fs::remove_dir_all(recorded.join("depth")).expect("depths");
-    let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
-    let mut bench = Workbench::start(address, &folder.path().join("sessions"), Some(recorded.clone()));
-    bench.until("the answer of the session", |model| model.session.folder.is_some() && idle_and_fresh(model));
-    let expected = bench.model().solve.current().expect("solved").result.hand_eye.clone();
-    drop(bench);
+    let expected = by_command_line(&recorded).hand_eye;
     // What another program would have written: images, poses and their description, and nothing of ours.
     let dataset = folder.path().join("recorded");
     std::fs::create_dir_all(dataset.join("images")).expect("a folder");
