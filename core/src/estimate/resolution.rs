@@ -22,9 +22,8 @@ pub(crate) const FINE_PX: f64 = 0.05;
 pub(crate) const PLACE_M: f64 = 1e-5;
 /// An angle likewise, radians: a thousandth of a degree, which moves a point at half a metre by that length.
 pub(crate) const ANGLE_RAD: f64 = 1e-3 * std::f64::consts::PI / 180.0;
-/// A depth of the target's plane that no depth camera resolves, metres. Triangulation to a hundredth of a pixel with a base line of
-/// 75 mm and 1000 px, half a metre away, errs by 0.03 mm; of surfaces that a renderer draws, the edges and the rounding of its
-/// buffer leave some thousandths.
+/// A depth of the target's plane that no depth camera resolves, metres: a third of what a disparity known to a hundredth of a pixel is
+/// off (0.03 mm half a metre away, base line 75 mm, 1000 px), and as much as a robot resolves.
 pub(crate) const DEPTH_M: f64 = 1e-5;
 
 /// Whether a displacement is one that a robot resolves, by its length \[m\] or its angle \[rad\].

@@ -2,9 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-/// The part of the mean variance that every corner has in common with all others and for itself, whatever its detector says. A
-/// tenth costs one part in a hundred where the statement is true, and keeps a single corner from counting more than ten typical
-/// ones.
+/// The part of the mean variance that every corner has for itself, whatever its detector says. A tenth costs one part in a hundred
+/// where the statement is true and corners are independent, and keeps a single corner from counting more than ten typical ones.
 pub(crate) const COMMON: f64 = 0.1;
 
 /// Covariance of all corners of an image, with what they share: where corners are the ends of edges, neighbours err alike.
