@@ -157,3 +157,24 @@ fn the_errors_of_a_depth_camera_are_found_to_what_is_stated() {
     assert!(tilt_sigma < turned / 5.0, "{tilt_sigma}: it would not be seen");
     assert!(depths.in_fit.weight.turned && depths.in_fit.other_probability < 0.05, "{depths:?}");
 }
+
+/// Drawn depths are exact but for the rounding of their numbers. The estimate counts them so; a verification, which looks for errors,
+/// counts them no better than depth cameras are.
+#[test]
+fn a_verification_takes_no_depth_for_better_than_a_camera_resolves() {
+    let mut t = trial(Mode::EyeInHand, VIEWS, &NOISE, camera(), 43);
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    for (view, board) in t.views.iter_mut().zip(&t.true_camera_from_target) {
+        let lens = t.intrinsics;
+        let image = depth_image(&mut rng, &lens, board.isometry(), 0.0, |_, _| 0.0);
+        view.depth = DepthPlane::new(&image, (lens.width, lens.height), &view.corners, &BOARD);
+    }
+    let found = calibrate(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+    let (noise, in_fit) = found.joint.as_ref().and_then(|joint| Some((joint.noise, joint.depths?))).expect("depths");
+    let level_m = |weight: DepthWeight| noise.corner_px / weight.px_per_m;
+    let counted = in_fit.in_fit.weight().expect("the answer uses them");
+    assert!(level_m(counted) < resolution::DEPTH_M, "{} m", level_m(counted));
+    let uncertainty = crate::verify::Predictor::new(&found).expect("a camera on a robot").uncertainty.expect("stated");
+    let (_, judged) = uncertainty.depths.expect("depths");
+    assert!((level_m(judged) / resolution::DEPTH_M - 1.0).abs() < 1e-9, "{} m", level_m(judged));
+}
