@@ -15,6 +15,8 @@ from bags import Bag
 from read_recordings import table
 
 STEP_NS = 50_000_000
+# Every view is eight images; all of a recording say no more of how a bag is read than these.
+VIEWS = 8
 
 folder = Path(sys.argv[1])
 poses, _ = table(folder)
@@ -23,7 +25,7 @@ with Bag(Path(sys.argv[2]), *sys.argv[3:]) as bag:
     flange = np.eye(4)
     flange[2, 3] = 0.1
     bag.transform("/tf_static", time, "link6", "tool0", flange)
-    names = list(poses)
+    names = list(poses)[:VIEWS]
     for view, name in enumerate(names):
         here = poses[name]
         there = poses[names[min(view + 1, len(names) - 1)]]

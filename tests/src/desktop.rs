@@ -1,6 +1,7 @@
 //! The window as a person has it before him: on a screen of its own (Xvfb), pressed by a real mouse and keyboard (xdotool),
 //! or in a browser, pressed by its events.
 
+use std::borrow::Cow;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -44,6 +45,17 @@ struct Widget {
     label: String,
     role: String,
     centre: (f64, f64),
+    enabled: bool,
+}
+
+/// A line of the list of widgets, which is read after every frame.
+#[derive(serde::Deserialize)]
+struct Node<'a> {
+    #[serde(borrow)]
+    label: Cow<'a, str>,
+    #[serde(borrow)]
+    role: Cow<'a, str>,
+    rect: [f64; 4],
     enabled: bool,
 }
 
@@ -172,13 +184,13 @@ impl Desktop {
     fn widgets(&self) -> Vec<Widget> {
         let list = std::fs::read_to_string(&self.widgets).unwrap_or_default();
         let widget = |line: &str| {
-            let node: serde_json::Value = serde_json::from_str(line).ok()?;
-            let at = |index: usize| node["rect"][index].as_f64();
+            let node: Node<'_> = serde_json::from_str(line).ok()?;
+            let [left, top, right, bottom] = node.rect;
             Some(Widget {
-                label: node["label"].as_str()?.to_owned(),
-                role: node["role"].as_str()?.to_owned(),
-                centre: (f64::midpoint(at(0)?, at(2)?), f64::midpoint(at(1)?, at(3)?)),
-                enabled: node["enabled"].as_bool()?,
+                label: node.label.into_owned(),
+                role: node.role.into_owned(),
+                centre: (f64::midpoint(left, right), f64::midpoint(top, bottom)),
+                enabled: node.enabled,
             })
         };
         list.lines().filter_map(widget).collect()

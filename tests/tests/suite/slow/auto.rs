@@ -187,7 +187,7 @@ fn read_exports_with_python(session: &Path) {
 fn a_realistic_cell_is_calibrated_with_every_seed() {
     let scene = workspace_root().join("assets/scenes/realistic.toml");
     let poses = workspace_root().join("assets/poses/realistic20.toml");
-    for seed in ["1", "2", "3", "4"] {
+    for seed in ["1", "2"] {
         let folder = tempfile::tempdir().expect("a folder");
         let (scene, poses) = (scene.to_str().expect("UTF-8"), poses.to_str().expect("UTF-8"));
         let result = auto(folder.path(), &["--scene", scene, "--poses", poses, "--seed", seed]);

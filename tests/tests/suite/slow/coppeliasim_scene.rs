@@ -3,10 +3,13 @@
 
 use std::process::{Command, Output};
 
+use handeye_core::targets::{Grid, TargetSpec};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 use serde_json::Value;
+
+const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
 fn scene() -> String {
     workspace_root().join("assets/scenes/coppeliasim.toml").display().to_string()
@@ -91,4 +94,13 @@ fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_f
     assert!(number(&summary["rotation_rms_deg"]) <= 0.05, "{summary}");
     // What a pose from corners alone makes of the tip are millimetres.
     assert!(number(&summary["follow_distance_rms_mm"]) <= 0.5, "{summary}");
+
+    // Where the tip has to be is what the truth says of the corner.
+    handeye(&["track", "--connect", &endpoint, "--calibration", &out, "--reach", "0", "--stand-off", "20"]);
+    let base_from_target = client.arm().ground_truth().expect("the truth").base_from_target.expect("of the board");
+    let tip = client.arm().base_from_tip().expect("the tip").translation();
+    let off = base_from_target.isometry().inverse_transform_point(&tip.into()) - BOARD.points()[0];
+    let off_mm = off.xy().norm().hypot(off.z.abs() - 0.02) * 1e3;
+    println!("the tip is {off_mm:.3} mm off the point 20 mm before the corner");
+    assert!(off_mm <= 0.3, "{off_mm} mm");
 }

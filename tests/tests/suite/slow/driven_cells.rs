@@ -5,7 +5,7 @@ use std::process::Command as Program;
 
 use handeye_app::command::Command;
 use handeye_app::limits;
-use handeye_app::model::{CapturePurpose, CellSource, Drivers, LinkState, Model, Motion, SolveStatus};
+use handeye_app::model::{CapturePurpose, CellSource, Drivers, JogSettings, LinkState, Model, Motion, SolveStatus};
 use handeye_core::geometry::frames::{Camera, Pose, Tip};
 use handeye_core::plan::guided::CHECKS;
 use handeye_core::project::taught_poses::{Goal, TaughtPoses};
@@ -121,6 +121,7 @@ fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever
         assert_eq!(bench.model().cell.as_ref().expect("a cell").joints.len(), joints);
         bench.click(Command::Arm(true));
         bench.until("the permission", Model::is_armed);
+        bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
         assert!(bench.model().confirms_moves(), "a real arm goes step by step");
         bench.click(Command::CalibrateForMe);
         let waits = |model: &Model| model.asked.is_some();

@@ -17,7 +17,7 @@ use handeye_core::targets::observation::Corner;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::workbench::Workbench;
-use handeye_tests::{handeye_binary, workspace_root};
+use handeye_tests::{handeye_binary, hurry, workspace_root};
 
 fn auto(folder: &Path, arguments: &[&str]) -> Output {
     let out = folder.join("session");
@@ -77,9 +77,10 @@ fn a_goal_out_of_reach_fails_with_the_reason_and_keeps_the_answer() {
     assert_eq!(output.status.code(), Some(2), "a goal is nobody's but the guide's");
 }
 
-/// The built-in cell at the pace of real time, with the board in view.
+/// The built-in cell at a pace of its own, with the board in view.
 fn connected(folder: &Path) -> (Workbench, CellServer) {
-    let scene = Scene::reference().expect("the scene");
+    let mut scene = Scene::reference().expect("the scene");
+    hurry(&mut scene);
     let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), folder, None);
     bench.until("a cell", |model| {

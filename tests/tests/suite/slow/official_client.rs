@@ -22,10 +22,16 @@ fn run(python: &std::path::Path, script: &str, arguments: &[&str], cbor: &str) -
 #[test]
 fn the_official_client_drives_the_cell_with_either_cbor_library() {
     let Some(python) = python() else { return };
-    for cbor in ["cbor", "cbor2"] {
-        let cell = CellProcess::start(&[]);
-        println!("{}", run(&python, "official_client.py", &[&cell.port().to_string()], cbor));
-    }
+    // Both at once: each waits for the time of its cell.
+    std::thread::scope(|scope| {
+        for cbor in ["cbor", "cbor2"] {
+            let python = &python;
+            scope.spawn(move || {
+                let cell = CellProcess::start(&[]);
+                println!("{}", run(python, "official_client.py", &[&cell.port().to_string()], cbor));
+            });
+        }
+    });
 }
 
 #[test]

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
-use handeye_tests::CellProcess;
 use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::network::{Network, Quality};
+use handeye_tests::{CellProcess, hurried};
 use serde_json::Value;
 
 /// From the last sign of a held button to an arm at rest.
@@ -77,7 +77,9 @@ fn a_first_user_gets_to_exported_files_in_a_browser_and_downloads_them() {
         return;
     }
     let _alone = alone();
-    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &[]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = hurried("reference", folder.path()).display().to_string();
+    let mut desktop = Desktop::in_browser((1440, 900), false, &shots("served"), &["--scene", &scene]);
     first_user(&mut desktop);
     // What the button asks for, as the page asks for it.
     desktop.place_of("Download as one archive");
@@ -103,7 +105,9 @@ fn a_first_user_gets_to_exported_files_with_fingers_on_a_tablet() {
         return;
     }
     let _alone = alone();
-    let mut desktop = Desktop::in_browser((1024, 768), true, &shots("served_tablet"), &[]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = hurried("reference", folder.path()).display().to_string();
+    let mut desktop = Desktop::in_browser((1024, 768), true, &shots("served_tablet"), &["--scene", &scene]);
     first_user(&mut desktop);
 }
 

@@ -18,7 +18,7 @@ const AT_REST_S: f64 = 0.3;
 /// How many stops at a page of the workbench that draws. Half as many go, in turn with them, through a workbench beside it that
 /// has nothing to draw: the same way, on the same machine at the same time. Whatever else a machine is busy with makes stops of
 /// both late; waiting for a frame makes those of the first late.
-const STOPS: usize = 100;
+const STOPS: usize = 50;
 
 /// How many standard deviations more late stops the first may have than twice those of the second. If a stop of either is late
 /// with the same small probability, the difference has a variance of twice the number of late stops: more than four come of

@@ -6,10 +6,10 @@ use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::project::session::Role;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_tests::handeye_binary;
 use handeye_tests::workbench::Workbench;
+use handeye_tests::{handeye_binary, hurry};
 
-/// The ten reference poses, captured and solved, and a cell to verify on. At full speed, or it takes minutes.
+/// The ten reference poses, captured and solved, and a cell to verify on.
 fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
     let session = folder.join("session");
     let made = std::process::Command::new(handeye_binary())
@@ -18,7 +18,8 @@ fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
         .output()
         .expect("handeye runs");
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    let scene = Scene::reference().expect("the scene");
+    let mut scene = Scene::reference().expect("the scene");
+    hurry(&mut scene);
     let cell = CellServer::start(CellConfig { real_time: Some(true), ..CellConfig::new(scene) }).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), folder, Some(session));
     bench.until("a cell", |model| {

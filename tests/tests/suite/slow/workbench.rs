@@ -9,6 +9,7 @@ use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::{CaptureId, Role};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_tests::hurry;
 use handeye_tests::workbench::Workbench;
 
 fn connected(model: &Model) -> bool {
@@ -24,10 +25,11 @@ fn idle_and_fresh(model: &Model) -> bool {
     model.solve.status == SolveStatus::Idle && model.solve.fresh
 }
 
-/// A cell that keeps pace with real time, with the ten reference poses captured and solved. The cell comes with it; it
+/// A cell that keeps a pace, with the ten reference poses captured and solved. The cell comes with it; it
 /// has what CoppeliaSim has, so that a session there goes the same way.
 fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
-    let scene = Scene::reference().expect("the scene");
+    let mut scene = Scene::reference().expect("the scene");
+    hurry(&mut scene);
     let config = CellConfig { real_time: Some(true), coppeliasim_only: true, ..CellConfig::new(scene) };
     let cell = CellServer::start(config).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), sessions, None);
