@@ -181,8 +181,16 @@ impl Desktop {
         self.home.path()
     }
 
+    /// The list of widgets as it was written last; empty before the first frame.
+    fn list(&self) -> String {
+        std::fs::read_to_string(&self.widgets).unwrap_or_default()
+    }
+
     fn widgets(&self) -> Vec<Widget> {
-        let list = std::fs::read_to_string(&self.widgets).unwrap_or_default();
+        Self::parse(&self.list())
+    }
+
+    fn parse(list: &str) -> Vec<Widget> {
         let widget = |line: &str| {
             let node: Node<'_> = serde_json::from_str(line).ok()?;
             let [left, top, right, bottom] = node.rect;
@@ -225,7 +233,16 @@ impl Desktop {
 
     fn until(&mut self, what: &str, mut is_so: impl FnMut(&[Widget]) -> bool) {
         let deadline = Instant::now() + PATIENCE;
-        while !is_so(&self.widgets()) {
+        let mut looked_at = None;
+        loop {
+            // Most changes of files are those of a list that says the same.
+            let list = self.list();
+            if looked_at.as_ref() != Some(&list) {
+                if is_so(&Self::parse(&list)) {
+                    return;
+                }
+                looked_at = Some(list);
+            }
             if Instant::now() > deadline {
                 self.photograph("gave-up");
                 let labels: Vec<String> = self.widgets().into_iter().map(|widget| widget.label).collect();
