@@ -28,7 +28,7 @@ impl CornerCovariance {
         for i in 0..numbers {
             shared[(i, i)] += COMMON;
         }
-        let whitener = Cholesky::new(shared)?.l().solve_lower_triangular(&DMatrix::identity(numbers, numbers))?;
+        let whitener = lower_inverse(&Cholesky::new(shared)?.unpack())?;
         whitener.iter().all(|value| value.is_finite()).then_some(Self { whitener, mean_px2 })
     }
 
@@ -45,7 +45,7 @@ impl CornerCovariance {
     /// The covariance of x and y of each corner in turn, squared pixels.
     fn px2(&self) -> Option<DMatrix<f64>> {
         let numbers = self.whitener.nrows();
-        let factor = self.whitener.solve_lower_triangular(&DMatrix::identity(numbers, numbers))?;
+        let factor = lower_inverse(&self.whitener)?;
         let mut px2 = &factor * factor.transpose();
         for i in 0..numbers {
             px2[(i, i)] -= COMMON;
@@ -65,6 +65,22 @@ impl CornerCovariance {
     pub(crate) fn whitened(&self, residuals: &DMatrix<f64>, unit_px2: f64) -> DMatrix<f64> {
         &self.whitener * residuals * (unit_px2 / self.mean_px2).sqrt()
     }
+}
+
+/// The inverse of a lower triangular matrix; `None` where it has none. Of the identity as the right side half is zero, which a
+/// solution by columns of whole length goes through all the same.
+pub(crate) fn lower_inverse(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let size = lower.nrows();
+    let mut inverse = DMatrix::identity(size, size);
+    for j in 0..size {
+        let left = size - j;
+        let solved =
+            lower.view((j, j), (left, left)).solve_lower_triangular_mut(&mut inverse.view_mut((j, j), (left, 1)));
+        if !solved {
+            return None;
+        }
+    }
+    Some(inverse)
 }
 
 #[cfg(test)]
@@ -98,6 +114,15 @@ mod tests {
         let some = all.of(&[3, 1]).expect("a covariance");
         let expected = px2.select_rows(&[6, 7, 2, 3]).select_columns(&[6, 7, 2, 3]);
         assert!((some.px2().expect("regular") - expected).amax() < 1e-12);
+    }
+
+    #[test]
+    fn a_lower_triangular_matrix_times_its_inverse_is_the_identity_and_one_without_has_none() {
+        let lower = Cholesky::new(neighbours() + DMatrix::identity(8, 8)).expect("positive").unpack();
+        let inverse = lower_inverse(&lower).expect("regular");
+        assert!((&lower * &inverse - DMatrix::identity(8, 8)).amax() < 1e-14);
+        assert_eq!(inverse.upper_triangle().iter().filter(|value| **value != 0.0).count(), 8, "but for its diagonal");
+        assert_eq!(lower_inverse(&DMatrix::zeros(2, 2)), None);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::polygon::Moments;
 use super::side::Edge;
+use crate::targets::corner_covariance::lower_inverse;
 
 /// Part of the way that a message goes in a round: all change at once.
 const DAMPING: f64 = 0.7;
@@ -161,7 +162,8 @@ impl Gaussian {
             }
         }
         let factor = precision.cholesky()?;
-        Some(Self { mean: factor.solve(&weighted), covariance: factor.inverse() })
+        let half = lower_inverse(factor.l_dirty())?;
+        Some(Self { mean: factor.solve(&weighted), covariance: half.transpose() * &half })
     }
 
     /// The displacements of two corners along a direction.
