@@ -15,7 +15,7 @@ from bags import Bag
 from read_recordings import table
 
 STEP_NS = 50_000_000
-# Every view is eight images; all of a recording say no more of how a bag is read than these.
+# Of the recording, which has twenty: each is eight images, and ten kinds of bags are read.
 VIEWS = 8
 
 folder = Path(sys.argv[1])

@@ -9,7 +9,7 @@ use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry};
 
-/// The ten reference poses, captured and solved, and a cell to verify on.
+/// The ten reference poses, captured and solved, and a cell to verify on. At full speed, or it takes minutes.
 fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
     let session = folder.join("session");
     let made = std::process::Command::new(handeye_binary())
