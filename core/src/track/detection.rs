@@ -129,17 +129,11 @@ impl Eye<'_> {
             return None;
         }
         let rough = self.rough(expected)?;
-        let mut found: Vec<(usize, corner::Found)> = self
-            .places(&rough, expected.first_dark)
-            .into_iter()
-            .filter_map(|(i, place)| Some((i, corner::exactly(self.image, &place, expected.blur_px)?)))
-            .collect();
-        let usual = median_high(found.iter().map(|(_, corner)| corner.contrast))?;
-        found.retain(|(_, corner)| corner.contrast >= MIN_CONTRAST_PART * usual);
-        let blur_px = median_high(found.iter().map(|(_, corner)| corner.blur_px));
-        let corners: Corners = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
-        let board = self.on_hard_edges(self.fitted(&corners, &rough, blur_px)?);
-        if board.fit.corners.len() < self.grid().len() && self.goes_on(&board.fit.pose, expected) {
+        let board = match self.on_hard_edges(&rough) {
+            Some(board) => board,
+            None => self.on_soft_edges(&rough, expected)?,
+        };
+        if !self.shows_all_sides(&board.fit.corners) && self.goes_on(&board.fit.pose, expected) {
             return None;
         }
         Some(board)
@@ -182,23 +176,25 @@ impl Eye<'_> {
         Some(Board { fit: self.better_of_both(&seen, fit), blur_px, first_dark: None })
     }
 
-    /// The same corners by all sides of the squares, where the image has hard edges.
-    fn on_hard_edges(&self, board: Board) -> Board {
-        // The sides of all squares are looked at, where the pose has them. Corners that were not seen stay so: they may be hidden,
-        // or beyond the board, and how many are seen decides what is believed.
-        let place =
-            |index: usize| Some(Corner::new(index, self.camera.project(&(board.fit.pose * self.drawn(index))).ok()?));
+    /// By all sides of the squares, where the image has hard edges: a profile of edges does not fit them.
+    fn on_hard_edges(&self, rough: &Isometry3<f64>) -> Option<Board> {
+        let place = |index: usize| Some(Corner::new(index, self.camera.project(&(rough * self.drawn(index))).ok()?));
         let places: Option<Vec<Corner>> = (0..self.grid().len()).map(place).collect();
-        let refined = places.and_then(|places| on_hard_edges(self.image, &places, &self.grid()));
-        let is_seen = |corner: &Corner| board.fit.corners.iter().any(|seen| seen.index == corner.index);
-        let fit = refined.and_then(|mut corners| {
-            corners.retain(is_seen);
-            pose::robust(&self.seen(), &corners, &board.fit.pose, EXACT_PX)
-        });
-        match fit.filter(|fit| self.check(&fit.corners).is_some()) {
-            Some(fit) => Board { fit, ..board },
-            None => board,
-        }
+        self.fitted(&on_hard_edges(self.image, &places?, &self.grid())?, rough, None)
+    }
+
+    /// Each corner for itself.
+    fn on_soft_edges(&self, rough: &Isometry3<f64>, expected: &Expected) -> Option<Board> {
+        let mut found: Vec<(usize, corner::Found)> = self
+            .places(rough, expected.first_dark)
+            .into_iter()
+            .filter_map(|(i, place)| Some((i, corner::exactly(self.image, &place, expected.blur_px)?)))
+            .collect();
+        let usual = median_high(found.iter().map(|(_, corner)| corner.contrast))?;
+        found.retain(|(_, corner)| corner.contrast >= MIN_CONTRAST_PART * usual);
+        let blur_px = median_high(found.iter().map(|(_, corner)| corner.blur_px));
+        let corners: Corners = found.into_iter().map(|(index, corner)| Corner::new(index, corner.px)).collect();
+        self.fitted(&corners, rough, blur_px)
     }
 
     /// What corners are seen through.
@@ -219,6 +215,17 @@ impl Eye<'_> {
         let freedom = (2 * fit.corners.len()).saturating_sub(6).max(1) as f64;
         let variance = (other.cost / freedom).max(MIN_SIGMA_PX * MIN_SIGMA_PX);
         if fit.cost - other.cost > MIRRORED_BETTER * variance { other } else { fit }
+    }
+
+    /// Whether corners of all four sides of the board are seen, more than chance has beyond it: then it is not seen shifted by
+    /// whole squares, which would leave the corners of a side where there are none.
+    pub fn shows_all_sides(&self, corners: &[Corner]) -> bool {
+        let Grid { columns, rows, .. } = self.grid();
+        let is_seen =
+            |at: &dyn Fn(usize) -> bool| corners.iter().filter(|corner| at(corner.index)).nth(MAX_BEYOND).is_some();
+        let (first, last) = (is_seen(&|index| index % columns == 0), is_seen(&|index| index % columns + 1 == columns));
+        let (top, bottom) = (is_seen(&|index| index < columns), is_seen(&|index| index / columns + 1 == rows));
+        first && last && top && bottom
     }
 
     /// Whether there are corners of the pattern just outside of the board.

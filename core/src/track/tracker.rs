@@ -193,8 +193,7 @@ impl Tracker {
         {
             near = eye.near(expected);
             // A part of the board could be another part of it, when it is not known well where to expect it.
-            let whole = near.as_ref().is_some_and(|board| board.fit.corners.len() == self.setup.target.len());
-            if near.is_some() && (whole || !eye.is_vague(expected)) {
+            if near.as_ref().is_some_and(|board| eye.shows_all_sides(&board.fit.corners) || !eye.is_vague(expected)) {
                 return Ok(near);
             }
         }

@@ -32,7 +32,7 @@ pub(super) fn find(image: &GrayImage, grid: &Grid, cancel: &CancelToken) -> Resu
         return Ok(None);
     };
     let found = with_all_stated(image, found)?;
-    let found = hard_edges::refine(image, &found).unwrap_or(found);
+    let found = hard_edges::refine(image, &found).map_or(found, |refined| refined.corners);
     let ordered = canonical(&found, grid, |order| contrast_of_first_square(image, order) < 0.0);
     Ok(ordered.is_regular().then_some(ordered))
 }
@@ -50,15 +50,18 @@ pub fn chessboard_in_sight(
     Ok(search::largest(image, grid, cancel)?.map(|(width, height)| (width.max(height), width.min(height))))
 }
 
-/// All corners of a chessboard, found by somebody to a pixel or so, as an image with hard edges has them, each with its
-/// covariance; `None` for softer images, and where corners are missing.
+/// The corners of a chessboard as an image with hard edges has them, each with its covariance, from where all of them are to a
+/// pixel or so; those that are hidden are left out. `None` for softer images, and where corners are missing.
 pub(crate) fn on_hard_edges(image: &GrayImage, corners: &[Corner], grid: &Grid) -> Option<Corners> {
     let mut points = vec![None; grid.len()];
     for corner in corners {
         *points.get_mut(corner.index)? = Some(corner.px);
     }
     let found = Ordered::new(points.into_iter().collect::<Option<_>>()?, grid);
-    Some(hard_edges::refine(image, &found)?.corners())
+    let hard_edges::Refined { corners, seen } = hard_edges::refine(image, &found)?;
+    let mut corners = corners.corners();
+    corners.retain(|corner| seen[corner.index]);
+    Some(corners)
 }
 
 /// Corners without a fit are refined by OpenCV and stated with [`UNSURE_PX`].

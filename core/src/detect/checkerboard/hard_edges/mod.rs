@@ -22,6 +22,7 @@
 //! The bound: the mean and the covariance of the distribution that all inequalities and that expectation leave;
 //! `docs/maths/hard_edges.md` has how near to it that comes.
 
+mod banded;
 mod map;
 mod polygon;
 mod side;
@@ -33,7 +34,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::detect::order::Ordered;
 use map::SmoothMap;
 use side::{Edge, Passage, Reach, Side};
-use together::Displacements;
+use together::{Displacements, Expected};
 
 /// How far a corner may be printed from where a smooth map of the board has it, one standard deviation per axis, in squares:
 /// 0.1 mm of 15 mm, which is much for a print.
@@ -56,59 +57,91 @@ const REACHES: [Reach; 2] = [Reach { part: 0.3, most_px: 2.0 }, Reach { part: 0.
 /// Rounds in which each polygon is seen in the light of all others. A round solves the equations of all corners once more.
 const ROUNDS: usize = 6;
 
-/// The corners of an image with hard edges, with their covariances; `None` where edges are softer, or the board is not seen
-/// whole enough: then what the search found stands.
-pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Option<Ordered> {
-    let [first, second] = &REACHES;
-    let near = refined(image, found, first, 0)?;
-    refined(image, &near, second, ROUNDS)
+/// The corners of an image with hard edges.
+pub(super) struct Refined {
+    /// All corners with their covariances.
+    pub corners: Ordered,
+    /// Which of them have a side along rows and one along columns that counts; the others are where those have them.
+    pub seen: Vec<bool>,
 }
 
-fn refined(image: &GrayImage, found: &Ordered, reach: &Reach, rounds: usize) -> Option<Ordered> {
-    let (columns, rows) = (found.columns, found.rows());
-    let map = SmoothMap::of(found, PRINT_SQUARES)?;
-    let sides = Side::all(columns, rows);
-    let (mut mixed, mut crossings) = (0, 0);
-    let mut used = Vec::with_capacity(sides.len());
-    for side in &sides {
-        let seen = side.seen(image, &map, reach);
-        mixed += seen.mixed;
-        crossings += seen.passages.len();
-        if crossings >= ENOUGH && mixed as f64 > MOST_MIXED * crossings as f64 {
-            return None;
-        }
-        if let Some(edge) = seen.edge {
-            used.push((side, edge, seen.passages));
-        }
-    }
-    let is_hard = mixed as f64 <= MOST_MIXED * crossings as f64;
-    if !is_hard || (used.len() as f64) < LEAST_SIDES * sides.len() as f64 {
-        return None;
-    }
-    let print_px = PRINT_SQUARES * map.square_px();
-    let edges = used.iter().map(|(side, edge, _)| (side.ends.map(|end| end.corner), edge));
-    let Displacements { moved, mut covariance_px2 } =
-        together::displacements(edges, &map.smooth_displacements(), print_px, rounds)?;
-    if moved.iter().any(|by| by.norm() > FURTHEST_PX) {
-        return None;
-    }
-    let mut phases = Phases::default();
-    for (side, edge, passages) in &used {
-        if let [Some(a), Some(b)] = side.ends.map(|end| end.corner) {
-            phases.add(edge, passages, [a, b].map(|corner| edge.normal.dot(&moved[corner])));
-        }
-    }
+/// The corners of an image with hard edges, with their covariances; `None` where edges are softer, or the board is not seen
+/// whole enough: then what the search found stands.
+pub(super) fn refine(image: &GrayImage, found: &Ordered) -> Option<Refined> {
+    let [first, second] = &REACHES;
+    let near = Pass::of(image, found, first, 0)?;
+    let near = Ordered { points: near.points, ..found.clone() };
+    let Pass { points, displacements, open_px2, seen } = Pass::of(image, &near, second, ROUNDS)?;
+    let mut covariance_px2 = displacements.covariance_px2();
     // Of all corners together.
-    let open_px2 = phases.open_px2();
-    for a in 0..moved.len() {
-        for b in 0..moved.len() {
+    for a in 0..points.len() {
+        for b in 0..points.len() {
             let mut shared = covariance_px2.fixed_view_mut::<2, 2>(2 * a, 2 * b);
             shared += open_px2;
         }
     }
-    let place = |(index, by): (usize, &Vector2<f64>)| map.at((index % columns) as f64, (index / columns) as f64) + by;
-    let points = moved.iter().enumerate().map(place).collect();
-    Some(Ordered::together(points, covariance_px2, columns))
+    Some(Refined { corners: Ordered::together(points, covariance_px2, found.columns), seen })
+}
+
+/// All sides looked at once.
+struct Pass {
+    points: Vec<Vector2<f64>>,
+    displacements: Displacements,
+    open_px2: Matrix2<f64>,
+    seen: Vec<bool>,
+}
+
+impl Pass {
+    fn of(image: &GrayImage, found: &Ordered, reach: &Reach, rounds: usize) -> Option<Self> {
+        let (columns, rows) = (found.columns, found.rows());
+        let map = SmoothMap::of(found, PRINT_SQUARES)?;
+        let sides = Side::all(columns, rows);
+        let (mut mixed, mut crossings) = (0, 0);
+        let mut used = Vec::with_capacity(sides.len());
+        for side in &sides {
+            let seen = side.seen(image, &map, reach);
+            mixed += seen.mixed;
+            crossings += seen.passages.len();
+            if crossings >= ENOUGH && mixed as f64 > MOST_MIXED * crossings as f64 {
+                return None;
+            }
+            if let Some(edge) = seen.edge {
+                used.push((side, edge, seen.passages));
+            }
+        }
+        let is_hard = mixed as f64 <= MOST_MIXED * crossings as f64;
+        if !is_hard || (used.len() as f64) < LEAST_SIDES * sides.len() as f64 {
+            return None;
+        }
+        let print_px = PRINT_SQUARES * map.square_px();
+        let edges = used.iter().map(|(side, edge, _)| (side.ends.map(|end| end.corner), edge));
+        let expected = Expected { smooth: map.smooth_displacements(), print_px, columns };
+        let displacements = together::displacements(edges, &expected, rounds)?;
+        let moved = displacements.moved();
+        if moved.iter().any(|by| by.norm() > FURTHEST_PX) {
+            return None;
+        }
+        let mut phases = Phases::default();
+        for (side, edge, passages) in &used {
+            if let [Some(a), Some(b)] = side.ends.map(|end| end.corner) {
+                phases.add(edge, passages, [a, b].map(|corner| edge.normal.dot(&moved[corner])));
+            }
+        }
+        let mut seen = vec![[false; 2]; moved.len()];
+        for (side, ..) in displacements.kept.iter().map(|number| &used[*number]) {
+            for corner in side.ends.iter().filter_map(|end| end.corner) {
+                seen[corner][usize::from(side.is_along_rows())] = true;
+            }
+        }
+        let place =
+            |(index, by): (usize, &Vector2<f64>)| map.at((index % columns) as f64, (index / columns) as f64) + by;
+        Some(Self {
+            points: moved.iter().enumerate().map(place).collect(),
+            displacements,
+            open_px2: phases.open_px2(),
+            seen: seen.into_iter().map(|along| along == [true; 2]).collect(),
+        })
+    }
 }
 
 /// Where within a pixel edges pass, −½ to ½, for those that run across rows and those that run across columns.

@@ -84,6 +84,11 @@ impl Side {
         along.chain(down).collect()
     }
 
+    /// Whether it runs along a row of the grid.
+    pub fn is_along_rows(&self) -> bool {
+        self.ends[0].place[1] == self.ends[1].place[1]
+    }
+
     /// Looks at every row (or column, across which the side runs) for where the level changes.
     pub fn seen(&self, image: &GrayImage, map: &SmoothMap, reach: &Reach) -> Seen {
         let [a, b] = self.ends.map(|end| map.at(end.place[0] as f64, end.place[1] as f64));
@@ -126,8 +131,7 @@ impl Side {
     /// From which distance on rows do not meet the other edge of an end within reach.
     fn margin(&self, map: &SmoothMap, end: usize, main: usize, reach: f64) -> f64 {
         let [column, row] = self.ends[end].place.map(|value| value as f64);
-        let along_rows = self.ends[0].place[1] == self.ends[1].place[1];
-        let (by_column, by_row) = if along_rows { (0.0, 0.5) } else { (0.5, 0.0) };
+        let (by_column, by_row) = if self.is_along_rows() { (0.0, 0.5) } else { (0.5, 0.0) };
         let other = map.at(column + by_column, row + by_row) - map.at(column - by_column, row - by_row);
         let slope = (other[main] / other[1 - main]).abs();
         MARGIN_PX + (reach + 1.0) * slope.min(1e3)

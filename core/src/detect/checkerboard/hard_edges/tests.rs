@@ -129,7 +129,7 @@ fn corners_of_hard_edges_are_found_where_they_were_printed_to_what_is_stated() {
             let image = drawn.image(1);
             let searched = search::find(&image, &GRID, &cancel).expect("not cancelled").board.expect("in sight");
             let searched = with_all_stated(&image, searched).expect("stated");
-            let refined = refine(&image, &searched).expect("hard edges");
+            let refined = refine(&image, &searched).expect("hard edges").corners;
             [(searched, drawn.truth()), (refined, drawn.truth())]
         };
         let all: Vec<_> = drawn.iter().map(found).collect();
@@ -155,7 +155,7 @@ fn a_map_by_all_corners_is_as_good_as_their_covariance_says_and_better_than_by_e
     for i in 0..24 {
         // Turned by 1° to 179° against the pixels: of a board along them nobody knows the place.
         let drawn = Drawn::random(&mut random, 0.02 + f64::from(i % 12) * 0.26, 0.0);
-        let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges");
+        let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges").corners;
         let truth = drawn.truth();
         // What a homography does to the places of the corners, linear in its eight numbers.
         let smooth = DMatrix::from_fn(2 * GRID.len(), 8, |row, column| {
@@ -213,7 +213,7 @@ fn an_edge_of_what_hides_the_outline_is_not_taken_for_the_end_of_a_side() {
             }
         }
         let Some(found) = refine(&image, &drawn.found(&mut random)) else { continue };
-        for (px, truth) in found.points.iter().zip(drawn.truth()) {
+        for (px, truth) in found.corners.points.iter().zip(drawn.truth()) {
             worst_px = worst_px.max((px - truth).norm());
         }
     }
@@ -228,7 +228,7 @@ fn sides_that_run_obliquely_on_a_tilted_board_are_straight() {
     let mut random = ChaCha8Rng::seed_from_u64(8);
     for i in 0..8 {
         let drawn = Drawn::within(&mut random, [40.0..50.0, 0.25..0.3], 0.3 + f64::from(i) * 0.15, 0.0);
-        let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges");
+        let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges").corners;
         let (px, relative) = errors([&(found, drawn.truth())]);
         println!("{px:.4} px, {relative:.3} of what is stated");
         // An exact print is better than what is expected of prints.
@@ -241,7 +241,7 @@ fn edges_along_rows_are_stated_to_be_unknown_within_the_pixel_but_for_what_the_b
     let mut random = ChaCha8Rng::seed_from_u64(6);
     let map = Matrix3::new(22.0, 0.0, 200.3, 0.0, 22.0, 150.4, 0.0, 0.0, 1.0);
     let drawn = Drawn { map, lines: [vec![0.0; 12], vec![0.0; 9]] };
-    let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges");
+    let found = refine(&drawn.image(1), &drawn.found(&mut random)).expect("hard edges").corners;
     // Every line of the grid has the same place within its pixel: no number of squares tells it.
     let (off, sd): (Vec<f64>, Vec<f64>) = found
         .points

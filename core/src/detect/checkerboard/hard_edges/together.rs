@@ -7,11 +7,11 @@
 //! Reference: Minka 2001, "Expectation propagation for approximate Bayesian inference"; Cunningham, Hennig & Lacoste-Julien 2011,
 //! "Gaussian probabilities and expectation propagation" (polyhedra).
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
+use super::banded::{Banded, Factor};
 use super::polygon::Moments;
 use super::side::Edge;
-use crate::targets::corner_covariance::lower_inverse;
 
 /// Part of the way that a message goes in a round: all change at once.
 const DAMPING: f64 = 0.7;
@@ -22,9 +22,26 @@ const CONTRADICTS: f64 = 25.0;
 
 /// Displacements of all corners, pixels.
 pub(super) struct Displacements {
-    pub moved: Vec<Vector2<f64>>,
+    all: Gaussian,
+    /// Numbers of the edges that count: those that no others contradict.
+    pub kept: Vec<usize>,
+}
+
+impl Displacements {
+    pub fn moved(&self) -> Vec<Vector2<f64>> {
+        self.all
+            .mean
+            .iter()
+            .step_by(2)
+            .zip(self.all.mean.iter().skip(1).step_by(2))
+            .map(|(x, y)| Vector2::new(*x, *y))
+            .collect()
+    }
+
     /// Of x and y of each in turn.
-    pub covariance_px2: DMatrix<f64>,
+    pub fn covariance_px2(&self) -> DMatrix<f64> {
+        self.all.factor.inverse() + self.all.open.transpose() * &self.all.open
+    }
 }
 
 /// What a side says of the displacements of its ends along its normal, as a Gaussian: precision, and precision times mean.
@@ -32,45 +49,59 @@ pub(super) struct Displacements {
 struct Message<'a> {
     ends: [Option<usize>; 2],
     edge: &'a Edge,
+    number: usize,
     precision: Matrix2<f64>,
     weighted: Vector2<f64>,
 }
 
-/// The displacements of all corners, x and y of each in turn.
-struct Gaussian {
-    mean: DVector<f64>,
-    covariance: DMatrix<f64>,
+/// What is expected of all corners before any side is looked at.
+pub(super) struct Expected {
+    /// Displacements that a map of the board could take up, orthonormal: of them nothing is expected.
+    pub smooth: DMatrix<f64>,
+    /// Besides them corners are independent, so far off in each axis.
+    pub print_px: f64,
+    /// Columns of the grid: corners whose numbers differ by more are no neighbours.
+    pub columns: usize,
 }
 
-/// The displacements that the edges leave. `smooth` are those that a map of the board could take up, orthonormal; besides them
-/// corners are expected to be independent, `print_px` off in each axis.
+/// The displacements of all corners, x and y of each in turn.
 ///
-/// `None` when they leave something open.
+/// What sides and print say has a band; that of the smooth displacements nothing is expected takes a matrix of low rank from it,
+/// which by the identity of Woodbury adds one of the same rank to the covariance.
+struct Gaussian {
+    mean: Vec<f64>,
+    /// Of the precision before anything is taken from it.
+    factor: Factor,
+    /// Its inverse within the band.
+    near: DMatrix<f64>,
+    /// `Oᵀ O` is added to that inverse.
+    open: DMatrix<f64>,
+}
+
+/// The displacements that the edges leave; `None` when they leave something open.
 pub(super) fn displacements<'a>(
     edges: impl Iterator<Item = ([Option<usize>; 2], &'a Edge)>,
-    smooth: &DMatrix<f64>,
-    print_px: f64,
+    expected: &Expected,
     rounds: usize,
 ) -> Option<Displacements> {
-    let weight = print_px.powi(-2);
-    let numbers = smooth.nrows();
-    let expected = (DMatrix::identity(numbers, numbers) - smooth * smooth.transpose()) * weight;
-    let mut messages: Vec<Message<'_>> = edges.filter_map(|(ends, edge)| Message::first(ends, edge)).collect();
-    let mut all = Gaussian::of(&expected, &messages)?;
+    let numbered = edges.enumerate();
+    let mut messages: Vec<Message<'_>> =
+        numbered.filter_map(|(number, (ends, edge))| Message::first(number, ends, edge)).collect();
+    let mut all = Gaussian::of(expected, &messages)?;
     while let Some(worst) = worst(&messages, &all) {
         messages.swap_remove(worst);
-        all = Gaussian::of(&expected, &messages)?;
+        all = Gaussian::of(expected, &messages)?;
     }
     for _ in 0..rounds {
         for message in &mut messages {
             message.hear(&all);
         }
-        all = Gaussian::of(&expected, &messages)?;
+        all = Gaussian::of(expected, &messages)?;
     }
-    let Gaussian { mean, covariance } = all;
-    let is_sound = covariance.iter().all(|v| v.is_finite()) && covariance.diagonal().iter().all(|v| *v > 0.0);
-    let moved = (0..numbers / 2).map(|i| Vector2::new(mean[2 * i], mean[2 * i + 1])).collect();
-    is_sound.then_some(Displacements { moved, covariance_px2: covariance })
+    all.mean
+        .iter()
+        .all(|v| v.is_finite())
+        .then(|| Displacements { kept: messages.iter().map(|message| message.number).collect(), all })
 }
 
 /// The message that contradicts all others most, if one does.
@@ -82,7 +113,7 @@ fn worst(messages: &[Message<'_>], all: &Gaussian) -> Option<usize> {
 
 impl<'a> Message<'a> {
     /// By the polygon alone.
-    fn first(ends: [Option<usize>; 2], edge: &'a Edge) -> Option<Self> {
+    fn first(number: usize, ends: [Option<usize>; 2], edge: &'a Edge) -> Option<Self> {
         let Moments { mean, covariance } = edge.moments;
         let precision = match ends {
             [Some(_), Some(_)] => covariance.try_inverse()?,
@@ -90,7 +121,7 @@ impl<'a> Message<'a> {
             [None, Some(_)] => Matrix2::new(0.0, 0.0, 0.0, 1.0 / covariance.m22),
             [None, None] => return None,
         };
-        Some(Self { ends, edge, precision, weighted: precision * mean })
+        Some(Self { ends, edge, number, precision, weighted: precision * mean })
     }
 
     /// Squared distance of what it says from what all others say, in standard deviations of the difference.
@@ -143,10 +174,16 @@ impl<'a> Message<'a> {
 }
 
 impl Gaussian {
-    fn of(expected: &DMatrix<f64>, messages: &[Message<'_>]) -> Option<Self> {
-        let mut precision = expected.clone();
-        let mut weighted = DVector::zeros(expected.nrows());
-        for Message { ends, edge, precision: of_ends, weighted: of_means } in messages {
+    fn of(expected: &Expected, messages: &[Message<'_>]) -> Option<Self> {
+        let Expected { smooth, print_px, columns } = expected;
+        let numbers = smooth.nrows();
+        let weight = print_px.powi(-2);
+        let mut precision = Banded::zeros(numbers, 2 * columns + 1);
+        for i in 0..numbers {
+            *precision.at_mut(i, i) = weight;
+        }
+        let mut weighted = DMatrix::zeros(numbers, 1);
+        for Message { ends, edge, precision: of_ends, weighted: of_means, .. } in messages {
             let normal = &edge.normal;
             for (a, corner) in ends.iter().enumerate() {
                 let Some(corner) = corner else { continue };
@@ -156,21 +193,35 @@ impl Gaussian {
                 for (b, other) in ends.iter().enumerate() {
                     let Some(other) = other else { continue };
                     for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                        precision[(2 * corner + i, 2 * other + j)] += normal[i] * normal[j] * of_ends[(a, b)];
+                        let (row, column) = (2 * corner + i, 2 * other + j);
+                        if row >= column {
+                            *precision.at_mut(row, column) += normal[i] * normal[j] * of_ends[(a, b)];
+                        }
                     }
                 }
             }
         }
         let factor = precision.cholesky()?;
-        let half = lower_inverse(factor.l_dirty())?;
-        Some(Self { mean: factor.solve(&weighted), covariance: half.transpose() * &half })
+        let spread = factor.solve(smooth.clone());
+        let taken = DMatrix::identity(smooth.ncols(), smooth.ncols()) / weight - smooth.tr_mul(&spread);
+        let mut open = spread.transpose();
+        if !taken.cholesky()?.l_dirty().solve_lower_triangular_mut(&mut open) {
+            return None;
+        }
+        let mean = factor.solve(weighted.clone()) + open.tr_mul(&(&open * &weighted));
+        Some(Self { mean: mean.as_slice().to_vec(), near: factor.inverse_in_band(), factor, open })
     }
 
-    /// The displacements of two corners along a direction.
+    /// Covariance of two numbers of the same corner or of neighbours.
+    fn covariance(&self, i: usize, j: usize) -> f64 {
+        self.near[(i, j)] + self.open.column(i).dot(&self.open.column(j))
+    }
+
+    /// The displacements of two corners along a direction, the same corner or neighbours.
     fn along(&self, corners: [usize; 2], direction: &Vector2<f64>) -> Moments {
-        let mean = corners.map(|corner| direction.dot(&self.mean.fixed_rows::<2>(2 * corner)));
+        let mean = corners.map(|corner| direction.x * self.mean[2 * corner] + direction.y * self.mean[2 * corner + 1]);
         let of = |a: usize, b: usize| {
-            let block = self.covariance.fixed_view::<2, 2>(2 * corners[a], 2 * corners[b]);
+            let block = Matrix2::from_fn(|i, j| self.covariance(2 * corners[a] + i, 2 * corners[b] + j));
             direction.dot(&(block * direction))
         };
         Moments { mean: mean.into(), covariance: Matrix2::from_fn(of) }
