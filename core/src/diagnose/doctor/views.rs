@@ -4,12 +4,14 @@ use std::cmp::Ordering;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 
+use crate::estimate::handeye::joint::CornerWeights;
 use crate::estimate::handeye::{Mode, subset};
 use crate::estimate::intrinsics::evidence::{Scatter, Score, scatter};
 use crate::estimate::intrinsics::{self, Options, SeenView};
 use crate::estimate::{CameraKnowledge, Observations, ObservedView, resolution};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Pose, Tip};
+use crate::geometry::planar_pose::refine::refine;
 use crate::geometry::planar_pose::{self, PlanarPose};
 use crate::geometry::se3::skew;
 use crate::geometry::statistics::median;
@@ -31,6 +33,8 @@ const WRONG_PX: f64 = 1.0;
 const WRONG_PART: f64 = 0.2;
 /// Rounds of leaving the worst corners out and fitting again.
 const ROUNDS: usize = 6;
+/// Steps to the pose of a view from where it is without what its corners share.
+const MOST_STEPS: usize = 20;
 /// A view whose corners are noisier than this many times the typical one is weighted by its own noise.
 const NOISY: f64 = 2.0;
 
@@ -115,6 +119,10 @@ struct Fit {
     corners: Corners,
     wrong: Vec<usize>,
     pose: PlanarPose,
+    /// How the corners count: each alike, unless their detector states what they have in common.
+    whitener: Whitener,
+    /// Variance of a corner per axis by the residuals of the view.
+    variance_px2: f64,
 }
 
 impl SessionViews {
@@ -199,9 +207,10 @@ impl SessionViews {
         }
         self.intrinsics = Some(camera);
         let points = BoardPoints::new(&observations.target.points());
+        with_what_corners_share(&mut fits, &camera, &points);
         let free = FreeParameters { lens: true, warp: true, ..FreeParameters::default() };
         let count = free.count(&camera);
-        let variances = fits.iter().flatten().map(Fit::variance_px2);
+        let variances = fits.iter().flatten().map(|fit| fit.variance_px2);
         let Some(typical) = median(variances) else {
             return Err(text!("the target's pose could not be found in any view"));
         };
@@ -217,12 +226,12 @@ impl SessionViews {
                 board: &points,
                 shape: &BoardShape::FLAT,
                 corners: &fit.corners,
-                whitener: &Whitener::Alike,
+                whitener: &fit.whitener,
                 depths: None,
             };
             let Ok(equations) = PoseEquations::new(&seen, &pose, free) else { continue };
             let Some(inverse) = equations.pose.try_inverse() else { continue };
-            let own = fit.variance_px2();
+            let own = fit.variance_px2;
             let variance = if own > NOISY * NOISY * typical { own } else { typical };
             let by_pose = equations.pose_by_form.columns(0, count).into_owned();
             let by_form = inverse * &by_pose;
@@ -286,9 +295,31 @@ fn pinhole_scatter(scores: &[Score]) -> Option<Scatter> {
 }
 
 impl Fit {
-    /// Variance of a corner per axis by the residuals of the view.
-    fn variance_px2(&self) -> f64 {
-        self.pose.sigma_px(self.corners.len()).powi(2)
+    fn new(corners: Corners, wrong: Vec<usize>, pose: PlanarPose) -> Self {
+        let variance_px2 = pose.sigma_px(corners.len()).powi(2);
+        Self { corners, wrong, pose, whitener: Whitener::Alike, variance_px2 }
+    }
+}
+
+/// Poses anew where a detector states what the corners of a view have in common, as those of hard edges do: of a board along the
+/// pixels the residuals do not show how far all of it may be off.
+fn with_what_corners_share(fits: &mut [Option<Fit>], camera: &Intrinsics, points: &BoardPoints) {
+    let stated = fits.iter().flatten().filter(|fit| fit.corners.covariance().is_some());
+    let Some(weights) = CornerWeights::stated(stated.flat_map(|fit| fit.corners.iter())) else { return };
+    for fit in fits.iter_mut().flatten().filter(|fit| fit.corners.covariance().is_some()) {
+        let whitener = weights.whitener(&fit.corners);
+        let seen = ViewInput {
+            intrinsics: camera,
+            board: points,
+            shape: &BoardShape::FLAT,
+            corners: &fit.corners,
+            whitener: &whitener,
+            depths: None,
+        };
+        let Some(minimum) = refine(&seen, fit.pose.best.camera_from_target.isometry(), MOST_STEPS) else { continue };
+        let spare = (2 * fit.corners.len()).saturating_sub(6).max(1);
+        fit.pose.best.camera_from_target = Pose::from_isometry(minimum.pose);
+        (fit.whitener, fit.variance_px2) = (whitener, minimum.squared_px / spare as f64);
     }
 }
 
@@ -334,10 +365,8 @@ fn camera_of(observations: &Observations, views: &[Corners]) -> Result<Intrinsic
 
 fn fit_all(views: &[Corners], target: &TargetSpec, camera: &Intrinsics) -> Vec<Option<Fit>> {
     let solve = |corners: &[Corner]| planar_pose::solve(corners, target, camera).ok();
-    let mut fits: Vec<Option<Fit>> = views
-        .iter()
-        .map(|corners| Some(Fit { pose: solve(corners)?, corners: corners.clone(), wrong: Vec::new() }))
-        .collect();
+    let mut fits: Vec<Option<Fit>> =
+        views.iter().map(|corners| Some(Fit::new(corners.clone(), Vec::new(), solve(corners)?))).collect();
     let Some(typical) = median(fits.iter().flatten().map(|f| f.pose.best.rms_px)) else {
         return fits;
     };
@@ -371,7 +400,7 @@ fn set_wrong_aside(
         let worst = corners.iter().map(&off).fold(0.0, f64::max);
         if worst <= limit_px {
             if !wrong.is_empty() {
-                *fit = Fit { corners: corners.into(), wrong, pose };
+                *fit = Fit::new(corners.into(), wrong, pose);
             }
             return;
         }
