@@ -7,9 +7,10 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use handeye_core::diagnose::calibrate;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::intrinsics::{Options, SeenView, solve};
-use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView};
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::sessions::{BOARD, REALISTIC, trial};

@@ -16,8 +16,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use handeye_core::diagnose::calibrate;
+use handeye_core::estimate::Method;
 use handeye_core::estimate::handeye::HandEye;
-use handeye_core::estimate::{Method, calibrate};
 use handeye_core::geometry::frames::{Camera, Mount};
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::Dataset;

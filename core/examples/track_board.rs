@@ -11,7 +11,8 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use handeye_core::detect::detect;
-use handeye_core::estimate::{Method, calibrate};
+use handeye_core::diagnose::calibrate;
+use handeye_core::estimate::Method;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::Dataset;
 use handeye_core::track::{Image, MotionModel, Setup, Tracker};

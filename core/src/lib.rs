@@ -4,8 +4,9 @@
 //! point measured with it is expected to be, come out:
 //!
 //! ```
+//! use handeye_core::diagnose::calibrate;
 //! use handeye_core::estimate::handeye::{HandEye, Mode};
-//! use handeye_core::estimate::{CameraKnowledge, Method, ObservedView, Observations, calibrate};
+//! use handeye_core::estimate::{CameraKnowledge, Method, ObservedView, Observations};
 //! use handeye_core::progress::CancelToken;
 //! use handeye_core::targets::{Grid, TargetSpec};
 //! # use handeye_core::geometry::camera::Intrinsics;

@@ -10,7 +10,8 @@
 use std::process::ExitCode;
 
 use handeye_core::diagnose::findings::{FindingCode, FindingOptions, findings};
-use handeye_core::estimate::{Calibration, Method, calibrate};
+use handeye_core::diagnose::{Calibration, calibrate};
+use handeye_core::estimate::Method;
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::Grid;

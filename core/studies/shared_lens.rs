@@ -7,9 +7,11 @@
 //! hand-eye transform, of which the estimator knows nothing. A row each for a lens of the model, for one that the model
 //! does not follow (waves of 0.1 px across the image, the same in all), and for a last session with 1 % more focal length.
 
+use handeye_core::diagnose::findings::FindingOptions;
+use handeye_core::diagnose::{Calibration, calibrate, examine};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::shared_lens::{NamedSession, calibrate_sharing_lens};
-use handeye_core::estimate::{self, Calibration, CameraKnowledge, Method, Observations, Options};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, Options};
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::sessions::{REALISTIC, Trial, add_waves, camera, trial};
@@ -84,15 +86,18 @@ fn group(lens: Lens, sessions: usize, views: usize, number: usize) -> Result<Gro
     let drawn: Vec<_> = (0..sessions).map(|k| session(lens, views, k + 1 == sessions, seed(k))).collect();
     let names: Vec<String> = (0..sessions).map(|k| k.to_string()).collect();
     let own = drawn.iter().map(|(trial, observations)| {
-        let found = estimate::calibrate(observations, Method::Joint, &cancel).map_err(|e| e.to_string())?;
+        let found = calibrate(observations, Method::Joint, &cancel).map_err(|e| e.to_string())?;
         answer(trial, &found).ok_or_else(|| "nothing is stated".to_owned())
     });
     let own = own.collect::<Result<Vec<_>, String>>()?;
     let named: Vec<_> =
         names.iter().zip(&drawn).map(|(name, (_, observations))| NamedSession { name, observations }).collect();
     let found = calibrate_sharing_lens(&named, Options::default(), &cancel).map_err(|e| e.to_string())?;
-    let shared = drawn.iter().zip(&found).map(|((trial, _), it)| answer(trial, it).ok_or("nothing is stated"));
-    let lens = found[0].shared_lens.as_ref().ok_or("no shared lens")?;
+    let lens = found[0].shared_lens.clone().ok_or("no shared lens")?;
+    let shared = drawn.iter().zip(found).map(|((trial, observations), fit)| {
+        let found = examine(observations, fit, &FindingOptions::default(), &cancel).map_err(|e| e.to_string())?;
+        answer(trial, &found).ok_or_else(|| "nothing is stated".to_owned())
+    });
     let last_alone_is_odd = lens.odd.len() == 1 && lens.odd[0].name == names[sessions - 1];
     let shared = shared.collect::<Result<Vec<_>, _>>()?;
     Ok(Group { own, shared, p_value: lens.p_value, odd: lens.odd.len(), last_alone_is_odd })

@@ -10,9 +10,10 @@
 
 use std::error::Error;
 
+use handeye_core::diagnose::calibrate;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::intrinsics::{Bend, Options, SeenView, solve, solve_screened};
-use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView};
 use handeye_core::geometry::camera::Distortion;
 use handeye_core::geometry::frames::Pose;
 use handeye_core::progress::CancelToken;

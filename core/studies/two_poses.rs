@@ -8,9 +8,10 @@
 
 use std::process::ExitCode;
 
+use handeye_core::diagnose::calibrate;
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::joint::Noise;
-use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus, calibrate};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_core::geometry::planar_pose;
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::sessions::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};

@@ -8,10 +8,9 @@
 use std::path::Path;
 
 use handeye_core::detect::detect;
-use handeye_core::diagnose::doctor::diagnose;
-use handeye_core::diagnose::findings::FindingOptions;
+use handeye_core::diagnose::calibrate;
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::image::{DynamicImage, GrayImage};
 use handeye_core::progress::CancelToken;
@@ -155,8 +154,7 @@ impl Session {
             views,
         };
         let work = CancelToken::default();
-        let mut calibration = calibrate(&observations, Method::Joint, &work)?;
-        let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &work);
+        let calibration = calibrate(&observations, Method::Joint, &work)?;
         let (Some(hand_eye), Some(joint), Some(lens)) =
             (&calibration.hand_eye, &calibration.joint, calibration.intrinsics())
         else {
@@ -172,7 +170,8 @@ impl Session {
             at_point_m: (found * point - truth * point).norm(),
             stated_m: calibration.tip_error_95_m(),
             corner_px: joint.noise.corner_px,
-            findings: diagnosis
+            findings: calibration
+                .diagnosis()
                 .findings
                 .iter()
                 .map(|finding| format!("{:?}", finding.code))

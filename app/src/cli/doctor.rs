@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use handeye_core::diagnose::calibrate_with;
 use handeye_core::diagnose::doctor::{Detail, diagnose};
 use handeye_core::diagnose::findings::FindingOptions;
 use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{CalibrateError, Method, calibrate};
+use handeye_core::estimate::{CalibrateError, Method, Options};
 
 use super::output::Output;
 use super::{Failure, heading, out, solve};
@@ -31,19 +32,16 @@ pub struct DoctorArgs {
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let observations = solve::read(&args.path, &cancel)?.seen.observations;
-    let mut calibration = match calibrate(&observations, Method::Joint, &cancel) {
-        Ok(calibration) => Some(calibration),
-        Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => {
-            return Err(Failure::failed(CalibrateError::HandEye(HandEyeError::Cancelled)));
-        }
+    let wanted = FindingOptions::with_goal_mm(args.goal);
+    let diagnosis = match calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel) {
+        Ok(calibration) => calibration.into_diagnosis(),
+        Err(error @ CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(Failure::failed(error)),
         // Why there is none is what the diagnosis is about.
         Err(error) => {
             tracing::warn!("no calibration: {error}");
-            None
+            diagnose(&observations, &wanted, &cancel)
         }
     };
-    let options = FindingOptions::with_goal_mm(args.goal);
-    let diagnosis = diagnose(&observations, calibration.as_mut(), &options, &cancel);
     if cancel.is_cancelled() {
         return Err(Failure::failed(HandEyeError::Cancelled));
     }

@@ -27,12 +27,12 @@ pub fn folders(paths: &[PathBuf], options: Options, cancel: &CancelToken) -> Res
         .zip(&inputs)
         .map(|(name, input)| NamedSession { name, observations: &input.seen.observations })
         .collect();
-    let calibrations = calibrate_sharing_lens(&sessions, options, cancel).map_err(refused)?;
+    let fits = calibrate_sharing_lens(&sessions, options, cancel).map_err(refused)?;
     let digests: Vec<String> = inputs.iter().map(|input| input.sha256.clone()).collect();
     let mut solutions = Vec::with_capacity(paths.len());
-    for (((i, path), input), calibration) in paths.iter().enumerate().zip(inputs).zip(calibrations) {
+    for (((i, path), input), fit) in paths.iter().enumerate().zip(inputs).zip(fits) {
         let job = solve::job(&input, Method::Joint, options);
-        let examined = worker::examined(&job, calibration, cancel.into());
+        let examined = worker::examined(&job, fit, cancel.into());
         let mut solved = examined.map_err(|error| solve::unsolved(error, path, &input.seen.observations, cancel))?;
         let others = digests.iter().enumerate().filter(|(j, _)| *j != i);
         let others: Vec<&str> = others.map(|(_, digest)| digest.as_str()).collect();

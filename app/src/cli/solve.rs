@@ -222,7 +222,7 @@ pub fn unsolved(error: CalibrateError, folder: &Path, observations: &Observation
 
 /// That the poses were written otherwise than was stated, in another unit or direction, if they were.
 fn misread(observations: &Observations, cancel: &CancelToken) -> Option<String> {
-    let findings = diagnose(observations, None, &FindingOptions::default(), cancel).findings;
+    let findings = diagnose(observations, &FindingOptions::default(), cancel).findings;
     let is_so = |finding: &&Finding| {
         matches!(
             finding.code,

@@ -1,8 +1,9 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
+use handeye_core::diagnose::Calibration;
 use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_core::estimate::handeye::joint::PrintErrors;
-use handeye_core::estimate::{Calibration, DepthsInFit, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_core::estimate::{DepthsInFit, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
 use handeye_core::verify::{DepthErrors, DepthReport};
 use handeye_core::wording::shown;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use handeye_core::diagnose::Calibration;
 use handeye_core::diagnose::findings::Finding;
-use handeye_core::estimate::Calibration;
 use handeye_core::progress::Stage;
 use handeye_core::project::result::CalibrationResult;
 use handeye_core::project::session::CaptureId;

@@ -4,10 +4,10 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_core::diagnose::doctor;
+use handeye_core::diagnose::examine;
 use handeye_core::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{self, CalibrateError, Calibration, Method, Observations, Options, ViewStatus};
+use handeye_core::estimate::{self, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
 use handeye_core::progress::{CancelToken, Progress, Work};
 use handeye_core::project::result::{DepthSummary, VerificationSummary, solve_options};
 use handeye_core::project::session::CaptureId;
@@ -77,20 +77,18 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
 /// # Errors
 /// [`CalibrateError`].
 pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> {
-    let calibration = estimate::calibrate_with(&job.observations, job.method, job.options, work)?;
-    examined(job, calibration, work)
+    let fit = estimate::fit_with(&job.observations, job.method, job.options, work)?;
+    examined(job, fit, work)
 }
 
 /// All that is said about the calibration of a job.
 ///
 /// # Errors
 /// When the work was cancelled.
-pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) -> Result<Solved, CalibrateError> {
+pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
-    let mut findings = doctor::diagnose(&job.observations, Some(&mut calibration), &goal, work.cancel).findings;
-    if work.is_cancelled() {
-        return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
-    }
+    let calibration = examine(&job.observations, fit, &goal, work.cancel)?;
+    let mut findings = calibration.diagnosis().findings.clone();
     let options = solve_options(job.method, job.options, &job.observations.target);
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
@@ -125,7 +123,7 @@ pub fn examined(job: &SolveJob, mut calibration: Calibration, work: Work<'_>) ->
 }
 
 /// What the depths of the captures in the fit say of a depth camera.
-fn depth_camera(job: &SolveJob, calibration: &Calibration) -> Option<DepthReport> {
+fn depth_camera(job: &SolveJob, calibration: &Fit) -> Option<DepthReport> {
     let lens = calibration.intrinsics()?;
     let shape =
         calibration.joint.as_ref().and_then(|joint| joint.shape).map_or_else(BoardShape::default, |it| it.shape);
@@ -193,7 +191,7 @@ mod tests {
             truth: None,
         };
         let cancel = CancelToken::default();
-        let solved = examined(&job, solved.calibration.clone(), (&cancel).into()).expect("not cancelled");
+        let solved = examined(&job, (*solved.calibration).clone(), (&cancel).into()).expect("not cancelled");
         let errors = solved.result.depth.and_then(|depth| depth.errors).expect("depths");
         let expected_mm = 2.0 + 0.01 * errors.at_mm;
         assert!((errors.offset_mm - expected_mm).abs() < 0.1, "{errors:?}");
@@ -203,8 +201,8 @@ mod tests {
         let json = solved.result.to_json().expect("a result");
         assert_eq!(CalibrationResult::from_json(&json).expect("readable").depth, solved.result.depth);
         cancel.cancel();
-        let calibration = solved.calibration.clone();
-        assert!(examined(&job, calibration, (&cancel).into()).is_err(), "it can be cancelled");
+        let fit = (*solved.calibration).clone();
+        assert!(examined(&job, fit, (&cancel).into()).is_err(), "it can be cancelled");
     }
 
     /// A depth camera beside the lens: what it measured at the board stands beside what the calibration predicts.

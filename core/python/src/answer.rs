@@ -1,9 +1,10 @@
 //! Calibrations and diagnoses, as the documents that the command line writes.
 
-use handeye_core::diagnose::doctor::{self, Detail, Diagnosis};
+use handeye_core::diagnose::doctor::{self, Detail};
 use handeye_core::diagnose::findings::{Finding, FindingOptions};
+use handeye_core::diagnose::{Calibration, calibrate_with};
 use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{CalibrateError, Calibration, Method, Options, calibrate_with};
+use handeye_core::estimate::{CalibrateError, Method, Options};
 use handeye_core::project::result::{CalibrationResult, TARGET_OPTION, solve_options};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -34,13 +35,9 @@ pub fn calibrate(
     let observations = observations.get();
     run(py, progress, |work| {
         let observed = &observations.observed;
-        let mut calibration = calibrate_with(observed, method, options, work)?;
-        let goal = FindingOptions::with_goal_mm(goal_mm);
-        let findings = doctor::diagnose(observed, Some(&mut calibration), &goal, work.cancel).findings;
-        if work.is_cancelled() {
-            return Err(HandEyeError::Cancelled.into());
-        }
-        let result = document(observations, &calibration, &findings, method, options)?;
+        let wanted = FindingOptions::with_goal_mm(goal_mm);
+        let calibration = calibrate_with(observed, method, options, &wanted, work)?;
+        let result = document(observations, &calibration, method, options)?;
         let sigmas = calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad));
         Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas))
     })
@@ -57,13 +54,13 @@ pub fn diagnose(
     let observations = observations.get();
     run(py, progress, |work| {
         let observed = &observations.observed;
-        // Why there is no calibration is what the diagnosis is about.
-        let mut calibration = match calibrate_with(observed, Method::Joint, Options::default(), work) {
+        let wanted = FindingOptions::with_goal_mm(goal_mm);
+        let diagnosis = match calibrate_with(observed, Method::Joint, Options::default(), &wanted, work) {
+            Ok(calibration) => calibration.into_diagnosis(),
             Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(HandEyeError::Cancelled.into()),
-            other => other.ok(),
+            // Why there is no calibration is what the diagnosis is about.
+            Err(_) => doctor::diagnose(observed, &wanted, work.cancel),
         };
-        let goal = FindingOptions::with_goal_mm(goal_mm);
-        let diagnosis: Diagnosis = doctor::diagnose(observed, calibration.as_mut(), &goal, work.cancel);
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled.into());
         }
@@ -80,7 +77,6 @@ fn method_by_name(name: &str) -> Result<Method, Failure> {
 fn document(
     observations: &Observations,
     calibration: &Calibration,
-    findings: &[Finding],
     method: Method,
     options: Options,
 ) -> Result<CalibrationResult, Failure> {
@@ -90,6 +86,6 @@ fn document(
         said.insert(TARGET_OPTION.to_owned(), Value::Null);
     }
     let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
-    result.findings = findings.iter().map(Finding::to_record).collect();
+    result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
     Ok(result)
 }

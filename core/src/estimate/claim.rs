@@ -11,10 +11,9 @@ use crate::estimate::uncertainty::quality::tip_error_95_at;
 use crate::geometry::se3;
 
 /// Which error may be stated.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Claim {
     /// The model explains the data: the error is that of its covariance.
-    #[default]
     AsModelled,
     /// The data support explanations that the answer does not count on.
     Moved(Vec<Alternative>),

@@ -5,8 +5,8 @@ use super::lens::Lens;
 use super::refine::{self, Judged, Refined};
 use super::residuals::{residuals, squared_residuals};
 use super::{
-    CalibrateError, CalibratedCamera, Calibration, JointDepths, JointFit, LinkCovariances, Method, Observations,
-    Options, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
+    CalibrateError, CalibratedCamera, Fit, JointDepths, JointFit, LinkCovariances, Method, Observations, Options,
+    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::Consensus;
@@ -26,7 +26,7 @@ pub fn calibrate(
     method: Method,
     options: Options,
     work: &Work<'_>,
-) -> Result<Calibration, CalibrateError> {
+) -> Result<Fit, CalibrateError> {
     let session = match Prepared::new(observations, options, work)? {
         Prepared::Camera(calibration) => return Ok(*calibration),
         Prepared::HandEye(session) => *session,
@@ -43,7 +43,7 @@ pub fn calibrate(
 /// What comes before the hand-eye transform.
 pub enum Prepared<'a> {
     /// Without a robot that is all.
-    Camera(Box<Calibration>),
+    Camera(Box<Fit>),
     /// All that the joint estimate begins with.
     HandEye(Box<Session<'a>>),
 }
@@ -96,7 +96,7 @@ pub struct Session<'a> {
     seen: Vec<DetectedView<'a>>,
     lens: Lens,
     /// What is known so far.
-    calibration: Calibration,
+    calibration: Fit,
     mode: Mode,
     board: BoardPoints,
     views: Vec<View>,
@@ -114,7 +114,7 @@ pub struct Fitted {
 
 impl Session<'_> {
     /// The answer of a closed form.
-    fn closed_form(mut self, name: &str) -> Result<Calibration, CalibrateError> {
+    fn closed_form(mut self, name: &str) -> Result<Fit, CalibrateError> {
         let solution = chosen(&self.calibration.methods, name)?;
         let problem = JointProblem::new(self.mode, &self.board, &self.views);
         take_closed_form(&mut self.calibration, &solution, &problem, &self.seen, &self.lens);
@@ -166,7 +166,7 @@ impl Session<'_> {
         mut refined: Refined,
         lens: Option<LensPrior<'_>>,
         work: &Work<'_>,
-    ) -> Result<Calibration, CalibrateError> {
+    ) -> Result<Fit, CalibrateError> {
         let fitted = self.fitted(&refined);
         if fitted.views.len() < self.pairs.len() {
             // For comparison on the same views.
@@ -247,7 +247,7 @@ fn total_rms(per_view: impl Iterator<Item = (f64, usize)>) -> f64 {
     (squared / corners.max(1) as f64).sqrt()
 }
 
-fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens: &Lens) -> Calibration {
+fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens: &Lens) -> Fit {
     let mut views: Vec<ViewResult> =
         observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::NoTarget)).collect();
     let points = BoardPoints::new(&observations.target.points()).points(&lens.shape);
@@ -266,13 +266,13 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
         corners_used.push(corners.len());
     }
     let sigma_px = lens.fit.as_ref().and_then(|fit| fit.sigma_px);
-    Calibration {
+    Fit {
         camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px }),
         camera_fit: lens.fit,
         lens_by_corners: (lens.free && !lens.is_bent()).then_some(lens.intrinsics),
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(corners_used))),
         views,
-        ..Calibration::default()
+        ..Fit::default()
     }
 }
 
@@ -303,7 +303,7 @@ fn with_robot(
 }
 
 fn take_joint(
-    calibration: &mut Calibration,
+    calibration: &mut Fit,
     problem: &JointProblem<'_>,
     refined: &Refined,
     judged: Judged,
@@ -388,7 +388,7 @@ fn take_joint(
 
 /// A closed form has no correction of robot poses: its residuals are those of the bare chain.
 fn take_closed_form(
-    calibration: &mut Calibration,
+    calibration: &mut Fit,
     solution: &ClosedFormSolution,
     problem: &JointProblem<'_>,
     seen: &[DetectedView<'_>],

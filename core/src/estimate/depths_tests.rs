@@ -66,7 +66,7 @@ fn tally(sessions: u64, noise_m: f64, error_m: impl Fn(&mut ChaCha8Rng) -> Error
         let with = t.observations(true);
         tally.sessions += 1.0;
         for (k, observations) in [without, with].iter().enumerate() {
-            let found = calibrate(observations, Method::Joint, &CancelToken::default()).expect("solves");
+            let found = fit(observations, Method::Joint, &CancelToken::default()).expect("solves");
             let joint = found.joint.as_ref().expect("a joint estimate");
             let off = error_m_of(&t, &found);
             tally.squares_mm2[k] += (off * 1e3).powi(2);
@@ -77,7 +77,7 @@ fn tally(sessions: u64, noise_m: f64, error_m: impl Fn(&mut ChaCha8Rng) -> Error
     tally
 }
 
-fn error_m_of(t: &Trial, found: &Calibration) -> f64 {
+fn error_m_of(t: &Trial, found: &Fit) -> f64 {
     let joint = found.joint.as_ref().expect("a joint estimate");
     let there = found.hand_eye.expect("a hand-eye").mount_from_camera();
     let point = joint.reference_point;
@@ -156,7 +156,7 @@ fn the_errors_of_a_depth_camera_are_found_to_what_is_stated() {
         let image = depth_image(&mut rng, &lens, board.isometry(), SINGLE_DEPTHS_M, error);
         view.depth = DepthPlane::new(&image, (lens.width, lens.height), &view.corners, &BOARD);
     }
-    let found = calibrate(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+    let found = fit(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
     let depths = found.joint.and_then(|joint| joint.depths).expect("depths");
     let (values, covariance) = (depths.in_fit.bias.values(), depths.in_fit.covariance);
     let expected = [0.005, 0.01, 0.0, 0.0, turned];
@@ -176,13 +176,13 @@ fn an_answer_that_leaves_the_depths_out_is_that_without_them() {
     for seed in LEFT_OUT {
         let mut t = trial(Mode::EyeInHand, VIEWS, &NOISE, camera(), seed);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let without = calibrate(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+        let without = fit(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
         for (view, board) in t.views.iter_mut().zip(&t.true_camera_from_target) {
             let lens = t.intrinsics;
             let image = depth_image(&mut rng, &lens, board.isometry(), SINGLE_DEPTHS_M, |_, _| 0.0);
             view.depth = DepthPlane::new(&image, (lens.width, lens.height), &view.corners, &BOARD);
         }
-        let with = calibrate(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+        let with = fit(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
         let joint = with.joint.as_ref().expect("a joint estimate");
         let depths = joint.depths.expect("an attempt");
         if depths.in_fit.accepted {
@@ -192,7 +192,7 @@ fn an_answer_that_leaves_the_depths_out_is_that_without_them() {
         assert_eq!(depths.bias, DepthBias::default());
         assert_eq!(depths.in_fit.weight(), None);
         assert!(depths.in_fit.heldout_after_px > depths.in_fit.heldout_before_px, "{depths:?}");
-        let camera = |found: &Calibration| found.hand_eye.expect("a hand-eye").mount_from_camera();
+        let camera = |found: &Fit| found.hand_eye.expect("a hand-eye").mount_from_camera();
         assert_eq!(camera(&with), camera(&without));
         assert_eq!(with.modelled_error_95_m(), without.modelled_error_95_m());
     }
@@ -210,12 +210,14 @@ fn a_verification_takes_no_depth_for_better_than_a_camera_resolves() {
         let image = depth_image(&mut rng, &lens, board.isometry(), 0.0, |_, _| 0.0);
         view.depth = DepthPlane::new(&image, (lens.width, lens.height), &view.corners, &BOARD);
     }
-    let found = calibrate(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
+    let found = fit(&t.observations(true), Method::Joint, &CancelToken::default()).expect("solves");
     let (noise, in_fit) = found.joint.as_ref().and_then(|joint| Some((joint.noise, joint.depths?))).expect("depths");
     let level_m = |weight: DepthWeight| noise.corner_px / weight.px_per_m;
     let counted = in_fit.in_fit.weight().expect("the answer uses them");
     assert!(level_m(counted) < resolution::DEPTH_M, "{} m", level_m(counted));
-    let uncertainty = crate::verify::Predictor::new(&found).expect("a camera on a robot").uncertainty.expect("stated");
+    let examined = crate::diagnose::Calibration::as_modelled(found);
+    let uncertainty =
+        crate::verify::Predictor::new(&examined).expect("a camera on a robot").uncertainty.expect("stated");
     let (_, judged) = uncertainty.depths.expect("depths");
     assert!((level_m(judged) / resolution::DEPTH_M - 1.0).abs() < 1e-9, "{} m", level_m(judged));
 }

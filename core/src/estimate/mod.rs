@@ -22,7 +22,7 @@ mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2, Vector6};
 
-use crate::estimate::claim::{Alternative, Claim};
+use crate::estimate::claim::Alternative;
 use crate::estimate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::estimate::handeye::joint::prediction::ErrorCurve;
 use crate::estimate::handeye::joint::{
@@ -327,7 +327,7 @@ const LENS_AT: usize = 12;
 /// A finished calibration.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
-pub struct Calibration {
+pub struct Fit {
     /// Both rigid links; `None` without a robot.
     pub hand_eye: Option<HandEye>,
     /// How well the links are known; `None` for a closed form.
@@ -350,13 +350,11 @@ pub struct Calibration {
     pub methods: Vec<MethodResult>,
     /// One entry per view, in the order of the observations.
     pub views: Vec<ViewResult>,
-    /// Which error may be stated; [`diagnose`](crate::diagnose::doctor::diagnose) finds out.
-    pub claim: Claim,
     /// The sessions that share the lens; `None` for a session by itself.
     pub shared_lens: Option<SharedLens>,
 }
 
-impl Calibration {
+impl Fit {
     /// The intrinsics; `None` when only pose pairs were given.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
         self.camera.as_ref().map(|camera| camera.intrinsics)
@@ -378,34 +376,13 @@ impl Calibration {
         self.link_covariances.as_ref().map(|links| &links.hand_eye)
     }
 
-    /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
-    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. Of the joint estimate
-    /// only, and `None` when the data contradict themselves.
-    pub fn tip_error_95_m(&self) -> Option<f64> {
-        self.error_95_m(&self.joint.as_ref()?.reference_point)
-    }
-
-    /// The same at any `point`, camera coordinates in metres.
-    pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
-        self.claim.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
-    }
-
-    /// How far what was found and the answer does not count on would move a point where the camera saw the target, metres: a
-    /// part of [`Self::tip_error_95_m`]. `None` where nothing of the kind was found, or nothing may be stated.
-    pub fn moved_m(&self) -> Option<f64> {
-        let joint = self.joint.as_ref()?;
-        let (covariance, law) = (self.hand_eye_covariance()?, joint.small_sample);
-        let (moved_m, _) = self.claim.parts_95_m(covariance, law, &joint.reference_point)?;
-        (moved_m >= resolution::PLACE_M).then_some(moved_m)
-    }
-
-    /// The same where the camera saw the target by the noise alone, as if the model were true whatever was found.
-    pub fn modelled_error_95_m(&self) -> Option<f64> {
+    /// Error of a measured point where the camera saw the target by the noise alone, 95 %, metres: what a stated error begins with.
+    pub(crate) fn modelled_error_95_m(&self) -> Option<f64> {
         self.modelled_error_95_at(&self.joint.as_ref()?.reference_point)
     }
 
     /// The same at any `point`, camera coordinates in metres.
-    pub fn modelled_error_95_at(&self, point: &Point3<f64>) -> Option<f64> {
+    pub(crate) fn modelled_error_95_at(&self, point: &Point3<f64>) -> Option<f64> {
         Some(quality::tip_error_95_at(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point))
     }
 }
@@ -633,24 +610,20 @@ pub enum ViewStatus {
 ///
 /// # Errors
 /// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
-pub fn calibrate<'a>(
-    observations: &Observations,
-    method: Method,
-    work: impl Into<Work<'a>>,
-) -> Result<Calibration, CalibrateError> {
-    calibrate_with(observations, method, Options::default(), work)
+pub fn fit<'a>(observations: &Observations, method: Method, work: impl Into<Work<'a>>) -> Result<Fit, CalibrateError> {
+    fit_with(observations, method, Options::default(), work)
 }
 
-/// As [`calibrate`], with options.
+/// As [`fit`], with options.
 ///
 /// # Errors
-/// As [`calibrate`].
-pub fn calibrate_with<'a>(
+/// As [`fit`].
+pub fn fit_with<'a>(
     observations: &Observations,
     method: Method,
     options: Options,
     work: impl Into<Work<'a>>,
-) -> Result<Calibration, CalibrateError> {
+) -> Result<Fit, CalibrateError> {
     let work = work.into();
     let used = || observations.views.iter().filter(|v| v.in_fit);
     let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());

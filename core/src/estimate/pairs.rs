@@ -3,14 +3,14 @@
 use nalgebra::Point3;
 
 use super::{
-    CalibrateError, CalibratedCamera, Calibration, CameraKnowledge, LinkCovariances, Method, Observations, Options,
-    PoseFit, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
+    CalibrateError, CalibratedCamera, CameraKnowledge, Fit, LinkCovariances, Method, Observations, Options, PoseFit,
+    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::estimate::handeye::closed_form::ClosedFormSolution;
 use crate::estimate::handeye::consensus::consensus;
 use crate::estimate::handeye::numbering::Turns;
 use crate::estimate::handeye::pose_graph::{self, METHOD, PoseGraphSolution, misfit};
-use crate::estimate::handeye::screening::{Distance, Estimator, Fit, Judged, screened};
+use crate::estimate::handeye::screening::{Distance, Estimator, Judged, ScreenedFit, screened};
 use crate::estimate::handeye::{HandEye, HandEyeError, Mode, PosePair, scale};
 use crate::progress::{CancelToken, Work};
 use crate::targets::bent::BoardShape;
@@ -20,7 +20,7 @@ pub fn calibrate(
     method: Method,
     options: Options,
     work: &Work<'_>,
-) -> Result<Calibration, CalibrateError> {
+) -> Result<Fit, CalibrateError> {
     let mode = observations.mode.unwrap_or(Mode::EyeInHand);
     let pairs: Vec<PosePair> = observations
         .views
@@ -34,14 +34,14 @@ pub fn calibrate(
         })
         .collect::<Result<_, _>>()?;
     check_motion(mode, &pairs)?;
-    let mut calibration = Calibration {
+    let mut calibration = Fit {
         camera: match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Some(CalibratedCamera { intrinsics, fixed: true, sigma_px: None }),
             CameraKnowledge::Estimate { .. } => None,
         },
         methods: closed_forms(&pairs, work)?,
         views: observations.views.iter().map(|v| ViewResult::new(v, ViewStatus::Used)).collect(),
-        ..Calibration::default()
+        ..Fit::default()
     };
     let (x, y) = match method {
         Method::ClosedForm(name) => {
@@ -99,7 +99,7 @@ struct Begin {
 }
 
 impl Begin {
-    fn new(pairs: &[PosePair], calibration: &Calibration, options: Options) -> Result<Self, HandEyeError> {
+    fn new(pairs: &[PosePair], calibration: &Fit, options: Options) -> Result<Self, HandEyeError> {
         let none = |reason| HandEyeError::NoSolution { method: METHOD, views: pairs.len(), reason };
         if options.free_scale {
             let (solution, scale) = scale::start(pairs)
@@ -123,13 +123,13 @@ fn estimate(
     middle: &Point3<f64>,
     options: Options,
     work: &Work<'_>,
-) -> Result<Fit<PoseGraphSolution>, HandEyeError> {
+) -> Result<ScreenedFit<PoseGraphSolution>, HandEyeError> {
     let estimator = OfPairs { pairs, begin, middle, cancel: work.cancel };
     if options.keep_outliers {
         let kept: Vec<usize> = (0..pairs.len()).collect();
         let solution = estimator.fit(&kept, None)?;
         let judged = estimator.judge(&solution, &kept)?;
-        return Ok(Fit { solution, kept, judged });
+        return Ok(ScreenedFit { solution, kept, judged });
     }
     let of_pair = |pair| misfit(pair, &begin.solution, begin.scale.unwrap_or(1.0));
     screened(&estimator, &pairs.iter().map(of_pair).collect::<Vec<_>>())

@@ -2,7 +2,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::estimate::calibrate_with;
+use crate::estimate::fit_with;
 use crate::geometry::frames::Pose;
 use crate::geometry::se3;
 use crate::testing::sessions::{REALISTIC, camera, noise_twist, trial};
@@ -32,16 +32,16 @@ fn spoil(observations: &mut Observations, views: &[usize]) {
     }
 }
 
-fn solve(observations: &Observations, options: Options) -> Calibration {
-    calibrate_with(observations, Method::Joint, options, &CancelToken::default()).expect("solves")
+fn solve(observations: &Observations, options: Options) -> Fit {
+    fit_with(observations, Method::Joint, options, &CancelToken::default()).expect("solves")
 }
 
-fn left_out(calibration: &Calibration) -> Vec<usize> {
+fn left_out(calibration: &Fit) -> Vec<usize> {
     let all = calibration.views.iter().enumerate();
     all.filter(|(_, view)| view.status == ViewStatus::Outlier).map(|(index, _)| index).collect()
 }
 
-fn off_m(calibration: &Calibration, truth: &HandEye) -> f64 {
+fn off_m(calibration: &Fit, truth: &HandEye) -> f64 {
     calibration.hand_eye.expect("a robot").mount_from_camera().distance_to(&truth.mount_from_camera()).0
 }
 
@@ -49,8 +49,7 @@ fn off_m(calibration: &Calibration, truth: &HandEye) -> f64 {
 fn offsets_of_joints_need_corners() {
     let (observations, _) = session(Mode::EyeInHand, 8, 1.0, 50);
     let options = Options { joint_offsets: true, ..Options::default() };
-    let error =
-        calibrate_with(&observations, Method::Joint, options, &CancelToken::default()).expect_err("nothing says it");
+    let error = fit_with(&observations, Method::Joint, options, &CancelToken::default()).expect_err("nothing says it");
     assert!(matches!(error, CalibrateError::NeedsCorners { .. }), "{error}");
 }
 
@@ -134,7 +133,7 @@ fn a_robot_that_only_turns_tells_no_unit() {
         view.base_from_tip = Some(Pose::from_isometry(nalgebra::Isometry3::from_parts([0.0; 3].into(), turned)));
     }
     let options = Options { free_scale: true, ..Options::default() };
-    let found = calibrate_with(&observations, Method::Joint, options, &CancelToken::default());
+    let found = fit_with(&observations, Method::Joint, options, &CancelToken::default());
     let told = found.map(|c| c.pose_fit.and_then(|fit| fit.shape?.scale_sigma));
     assert!(!matches!(told, Ok(Some(sigma)) if sigma < 0.5), "{told:?}");
 }

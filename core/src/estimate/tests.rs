@@ -4,14 +4,14 @@ use super::*;
 use crate::progress::{CancelToken, Progress};
 use crate::testing::sessions::{REALISTIC, Trial, add_print_errors, add_waves, camera, trial};
 
-fn solve(observations: &Observations, method: Method) -> Calibration {
-    calibrate(observations, method, &CancelToken::default()).expect("solves")
+fn solve(observations: &Observations, method: Method) -> Fit {
+    fit(observations, method, &CancelToken::default()).expect("solves")
 }
 
 /// Every view counts, however wrong.
-fn solve_all(observations: &Observations) -> Calibration {
+fn solve_all(observations: &Observations) -> Fit {
     let keep = Options { keep_outliers: true, ..Options::default() };
-    calibrate_with(observations, Method::Joint, keep, &CancelToken::default()).expect("solves")
+    fit_with(observations, Method::Joint, keep, &CancelToken::default()).expect("solves")
 }
 
 fn set(views: usize, seed: u64) -> Trial {
@@ -19,8 +19,8 @@ fn set(views: usize, seed: u64) -> Trial {
 }
 
 /// Distance in units of the standard deviation, the worst of the twelve numbers of hand-eye and pinhole.
-fn off_in_sigmas(a: &Calibration, b: &Calibration) -> f64 {
-    let links = |c: &Calibration| c.hand_eye.expect("a robot").mount_from_camera();
+fn off_in_sigmas(a: &Fit, b: &Fit) -> f64 {
+    let links = |c: &Fit| c.hand_eye.expect("a robot").mount_from_camera();
     let delta = crate::geometry::se3::log((links(a).inverse() * links(b)).isometry());
     let covariance = a.hand_eye_covariance().expect("stated");
     let pose = (0..6).map(|i| delta[i].abs() / covariance[(i, i)].sqrt());
@@ -39,13 +39,17 @@ fn a_view_left_out_changes_the_answer_as_if_it_were_not_there() {
     for method in [Method::Joint, Method::ClosedForm("park_martin")] {
         let (a, b) = (solve(&excluded, method), solve(&absent, method));
         assert_eq!(a.hand_eye, b.hand_eye);
-        let numbers = |c: &Calibration| (c.rms_px, c.joint.as_ref().map(|j| j.heldout_rms_px), c.tip_error_95_m());
+        let numbers = |c: &Fit| (c.rms_px, c.joint.as_ref().map(|j| j.heldout_rms_px), c.modelled_error_95_m());
         assert_eq!(numbers(&a), numbers(&b));
         let left_out = &a.views[3];
         assert_eq!((left_out.status, left_out.rms_px, left_out.residuals.len()), (ViewStatus::Excluded, None, 0));
         assert_eq!(a.views[4], b.views[3], "results stay with their views");
     }
-    let document = solve(&excluded, Method::Joint).to_result("0", None, std::collections::BTreeMap::new());
+    let document = crate::diagnose::Calibration::as_modelled(solve(&excluded, Method::Joint)).to_result(
+        "0",
+        None,
+        std::collections::BTreeMap::new(),
+    );
     assert_eq!(document.views[3].status, crate::project::result::ViewRecordStatus::Excluded);
 }
 
@@ -70,13 +74,13 @@ fn leaving_out_too_many_views_is_told_apart_from_a_target_that_was_not_found() {
     for view in &mut observations.views[..3] {
         view.in_fit = false;
     }
-    let error = calibrate(&observations, Method::Joint, &CancelToken::default()).expect_err("too few");
+    let error = fit(&observations, Method::Joint, &CancelToken::default()).expect_err("too few");
     assert!(matches!(error, CalibrateError::TooFewLeft { left: 2, excluded: 3, need: 3 }), "{error}");
     for view in &mut observations.views[1..] {
         (view.in_fit, view.corners) = (true, None);
     }
     observations.views[0].in_fit = true;
-    let error = calibrate(&observations, Method::Joint, &CancelToken::default()).expect_err("not found");
+    let error = fit(&observations, Method::Joint, &CancelToken::default()).expect_err("not found");
     assert!(matches!(error, CalibrateError::TargetNotFound { found: 1, images: 5, .. }), "{error}");
 }
 
@@ -144,7 +148,7 @@ fn stages_come_in_order_and_each_begins_with_nothing_done() {
     let seen: RefCell<Vec<Progress>> = RefCell::default();
     let cancel = CancelToken::default();
     let work = Work { cancel: &cancel, progress: &|p| seen.borrow_mut().push(p) };
-    calibrate(&observations, Method::Joint, work).expect("solves");
+    fit(&observations, Method::Joint, work).expect("solves");
     let seen = seen.into_inner();
     let mut stages: Vec<Stage> = seen.iter().map(|p| p.stage).collect();
     stages.dedup();
@@ -174,7 +178,7 @@ fn every_stage_ends_when_it_is_cancelled() {
                 *later.borrow_mut() = true;
             }
         };
-        let result = calibrate(&observations, Method::Joint, Work { cancel: &cancel, progress: &progress });
+        let result = fit(&observations, Method::Joint, Work { cancel: &cancel, progress: &progress });
         assert!(matches!(result, Err(CalibrateError::HandEye(HandEyeError::Cancelled))), "{stage:?}: {result:?}");
         assert!(!later.into_inner(), "{stage:?} went on");
     }
@@ -208,7 +212,7 @@ fn a_wrong_view_is_an_outlier_and_changes_nothing_and_can_be_kept() {
     assert!(off_in_sigmas(&c, &solve(&without, Method::Joint)) < 0.05);
     let kept = solve_all(&t.observations(true));
     assert_eq!(kept.views[5].status, ViewStatus::Used);
-    assert!(kept.tip_error_95_m() > c.tip_error_95_m().map(|e| 3.0 * e), "its noise is counted");
+    assert!(kept.modelled_error_95_m() > c.modelled_error_95_m().map(|e| 3.0 * e), "its noise is counted");
 }
 
 #[test]
@@ -266,7 +270,7 @@ fn the_size_of_the_target_is_found_when_it_is_asked_for() {
     }
     let options = Options { free_scale: true, ..Options::default() };
     let observations = t.observations(false);
-    let c = calibrate_with(&observations, Method::Joint, options, &CancelToken::default()).expect("solves");
+    let c = fit_with(&observations, Method::Joint, options, &CancelToken::default()).expect("solves");
     let found = c.joint.expect("joint").shape.expect("estimated");
     let sigma = found.scale_sigma.expect("estimated");
     assert!((found.shape.scale - 1.02).abs() < 4.0 * sigma && sigma < 2e-3, "{found:?}");

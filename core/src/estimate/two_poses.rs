@@ -31,7 +31,7 @@ pub(super) fn take_agreeing(
 mod tests {
     use crate::estimate::handeye::Mode;
     use crate::estimate::handeye::joint::Noise;
-    use crate::estimate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus, calibrate};
+    use crate::estimate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus, fit};
     use crate::geometry::planar_pose::{Solution, solve};
     use crate::progress::CancelToken;
     use crate::testing::sessions::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};
@@ -51,7 +51,7 @@ mod tests {
                     camera: CameraKnowledge::Fixed(camera()),
                     views: trial.views.iter().map(ObservedView::from).collect(),
                 };
-                let found = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("solves");
+                let found = fit(&observations, Method::Joint, &CancelToken::default()).expect("solves");
                 for ((view, truth), result) in trial.views.iter().zip(&trial.true_camera_from_target).zip(&found.views)
                 {
                     let pose = solve(&view.corners, &SMALL_TARGET, &camera()).expect("a pose");

@@ -6,17 +6,16 @@ use rand_chacha::ChaCha8Rng;
 
 use super::arms;
 use super::sessions::{BOARD, REALISTIC, camera, noise_twist, reported, seen};
-use crate::diagnose::doctor;
-use crate::diagnose::findings::FindingOptions;
+use crate::diagnose::{Calibration, calibrate};
 use crate::estimate::handeye::joint::chain::correction_transform;
 use crate::estimate::handeye::joint::{Noise, RobotField, ViewModel};
 use crate::estimate::handeye::{HandEye, Mode};
-use crate::estimate::{Calibration, CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView, calibrate};
+use crate::estimate::{CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView};
 use crate::geometry::arm::{Arm, ArmKind, JointValues};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
 use crate::plan::guided::choose::Robot;
-use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, LEAST_VIEWS, Next, Step};
+use crate::plan::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
 use crate::plan::{self, ArmBody, Carried, Obstacle, Pace, Surroundings};
 use crate::progress::CancelToken;
 use crate::targets::bent::{BoardPoints, BoardShape};
@@ -321,17 +320,6 @@ impl GuidedCell {
         Known { observations: &self.observations, calibration, robot: Some(&self.robot), elapsed_s }
     }
 
-    /// The same as a user gets it: from the first pose on at which guided capture may end it is examined, too, which decides
-    /// what error may be stated.
-    fn solve(&self) -> Option<Calibration> {
-        let mut calibration = self.calibrate()?;
-        if self.observations.views.len() >= LEAST_VIEWS {
-            let (options, cancel) = (FindingOptions::default(), CancelToken::default());
-            doctor::diagnose(&self.observations, Some(&mut calibration), &options, &cancel);
-        }
-        Some(calibration)
-    }
-
     /// The calibration from the views so far.
     pub fn calibrate(&self) -> Option<Calibration> {
         calibrate(&self.observations, Method::Joint, &CancelToken::default()).ok()
@@ -360,7 +348,7 @@ impl GuidedCell {
             if self.capture(&joints) {
                 times_s.push(time_s);
                 guide.captured();
-                calibration = self.solve();
+                calibration = self.calibrate();
                 if let Some(solved) = &calibration
                     && let (Some(stated), Some(truth)) = (solved.tip_error_95_m(), self.true_error_m(solved))
                 {

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::guided_cell::GuidedCell;
 use super::sessions::{BOARD, seen};
-use crate::estimate::Calibration;
+use crate::diagnose::Calibration;
 use crate::estimate::handeye::joint::ViewModel;
 use crate::geometry::frames::{Camera, Pose, Target};
 use crate::plan::guided::by_hand::{HandGuide, HandNext, Wanted};

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix6, Vector2};
 
 use super::VerifyError;
-use crate::estimate::Calibration;
+use crate::diagnose::Calibration;
 use crate::estimate::handeye::HandEye;
 use crate::estimate::handeye::joint::{
     CornerWeights, DepthWeight, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,

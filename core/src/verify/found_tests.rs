@@ -6,9 +6,11 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::diagnose::findings::FindingOptions;
+use crate::diagnose::{Calibration, calibrate_with};
 use crate::estimate::handeye::joint::{Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, Mode};
-use crate::estimate::{self, Calibration, CameraKnowledge, Method, Observations, ObservedView, Options};
+use crate::estimate::{CameraKnowledge, Method, Observations, ObservedView, Options};
 use crate::geometry::arm::{ArmKind, ArmModel};
 use crate::geometry::camera::Intrinsics;
 use crate::progress::CancelToken;
@@ -28,7 +30,8 @@ fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
 }
 
 fn solved(observations: &Observations, options: Options) -> Calibration {
-    estimate::calibrate_with(observations, Method::Joint, options, &CancelToken::default()).expect("solves")
+    let (wanted, cancel) = (FindingOptions::default(), CancelToken::default());
+    calibrate_with(observations, Method::Joint, options, &wanted, &cancel).expect("solves")
 }
 
 /// The corners of a trial as if its board had been printed larger, with the noise that they had.

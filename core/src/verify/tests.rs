@@ -3,9 +3,10 @@ use rand::SeedableRng as _;
 
 use super::*;
 use crate::depth::DepthImage;
+use crate::diagnose::calibrate;
+use crate::estimate::Method;
 use crate::estimate::handeye::joint::{Noise, SmallSample};
 use crate::estimate::handeye::{HandEye, Mode};
-use crate::estimate::{Method, calibrate};
 use crate::progress::CancelToken;
 use crate::targets::bent::BoardShape;
 use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, normal, trial};

@@ -1,9 +1,10 @@
 //! The six faults that have to be ranked first, and healthy sessions.
 
+use handeye_core::diagnose::calibrate;
 use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
 use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{Method, Observations, ObservedView, calibrate};
+use handeye_core::estimate::{Method, Observations, ObservedView};
 use handeye_core::progress::CancelToken;
 use handeye_core::testing::faulty::{ArmError, Fault, Servo, Setup, changed, session};
 use handeye_core::testing::sessions::normal;
@@ -14,13 +15,15 @@ use rand_chacha::ChaCha8Rng;
 /// The diagnosis with the calibration beside it, as the command line makes it.
 pub fn examined(observations: &Observations) -> Diagnosis {
     let cancel = CancelToken::default();
-    let mut calibration = calibrate(observations, Method::Joint, &cancel).ok();
-    diagnose(observations, calibration.as_mut(), &FindingOptions::default(), &cancel)
+    match calibrate(observations, Method::Joint, &cancel) {
+        Ok(calibration) => calibration.diagnosis().clone(),
+        Err(_) => examined_alone(observations),
+    }
 }
 
 /// The diagnosis of the data alone, which takes a third of the time.
 pub fn examined_alone(observations: &Observations) -> Diagnosis {
-    diagnose(observations, None, &FindingOptions::default(), &CancelToken::default())
+    diagnose(observations, &FindingOptions::default(), &CancelToken::default())
 }
 
 fn direction(rng: &mut ChaCha8Rng) -> Vector3<f64> {

@@ -8,11 +8,12 @@
 #[expect(dead_code, reason = "the test draws more than is printed here")]
 mod scene;
 
-use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
-use handeye_core::diagnose::findings::{FindingCode, FindingOptions};
+use handeye_core::diagnose::doctor::Diagnosis;
+use handeye_core::diagnose::findings::FindingCode;
+use handeye_core::diagnose::{Calibration, calibrate};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::uncertainty::{quality, widening};
-use handeye_core::estimate::{Calibration, JointFit, Method, Observations, calibrate};
+use handeye_core::estimate::{JointFit, Method, Observations};
 use handeye_core::progress::CancelToken;
 use nalgebra::{DMatrix, Matrix6};
 use scene::Scene;
@@ -25,8 +26,8 @@ const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
 /// As the command line makes it.
 fn examined(observations: &Observations) -> Option<(Calibration, Diagnosis)> {
     let cancel = CancelToken::default();
-    let mut calibration = calibrate(observations, Method::Joint, &cancel).ok()?;
-    let diagnosis = diagnose(observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+    let calibration = calibrate(observations, Method::Joint, &cancel).ok()?;
+    let diagnosis = calibration.diagnosis().clone();
     Some((calibration, diagnosis))
 }
 

@@ -1,8 +1,9 @@
 //! Sessions of which the truth is known, drawn by code that shares nothing with the estimator: the projection, the chain and
 //! the rotations are written out here, and the robot errs in waves across its workspace, which no model of it follows.
 
+use handeye_core::diagnose::Calibration;
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{Calibration, CameraKnowledge, Observations, ObservedView};
+use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView};
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::geometry::frames::{Base, Pose, Tip};
 use handeye_core::targets::observation::Corner;

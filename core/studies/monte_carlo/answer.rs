@@ -138,17 +138,17 @@ pub fn product(trial: &Trial) -> Result<Answer, String> {
         camera,
         views: trial.views.iter().map(ObservedView::from).collect(),
     };
-    let found =
-        estimate::calibrate(&observations, Method::Joint, &CancelToken::default()).map_err(|e| e.to_string())?;
+    let found = estimate::fit(&observations, Method::Joint, &CancelToken::default()).map_err(|e| e.to_string())?;
     let missing = || "the calibration has no hand-eye transform".to_owned();
     let joint = found.joint.as_ref().ok_or_else(missing)?;
+    let covariance = *found.hand_eye_covariance().ok_or_else(missing)?;
     Ok(Answer {
         mount_from_camera: found.hand_eye.ok_or_else(missing)?.mount_from_camera(),
-        covariance: *found.hand_eye_covariance().ok_or_else(missing)?,
+        covariance,
         small_sample: joint.small_sample,
         noise: joint.noise,
         aside: found.views.iter().filter(|view| view.status == ViewStatus::Outlier).count(),
-        tip_error_95_m: found.tip_error_95_m().ok_or_else(missing)?,
+        tip_error_95_m: quality::tip_error_95_at(&covariance, joint.small_sample, &joint.reference_point),
         reference_point: joint.reference_point,
     })
 }

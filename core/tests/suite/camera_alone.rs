@@ -2,9 +2,8 @@
 //! it at length.
 
 use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity, findings};
-use handeye_core::estimate::{
-    Calibration, CameraKnowledge, Method, Observations, Options, ViewStatus, calibrate, calibrate_with,
-};
+use handeye_core::diagnose::{Calibration, calibrate};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, Options, ViewStatus, fit_with};
 use handeye_core::geometry::camera::{Distortion, Intrinsics};
 use handeye_core::progress::CancelToken;
 use handeye_core::targets::Grid;
@@ -122,7 +121,7 @@ fn a_few_wrong_corners_are_named_and_change_nothing() {
     }
     assert!(found(&observations, &calibration, FindingCode::OutlierCorners).is_some());
     let all = Options { keep_outliers: true, ..Options::default() };
-    let kept = calibrate_with(&observations, Method::Joint, all, &CancelToken::default()).expect("calibrates");
+    let kept = fit_with(&observations, Method::Joint, all, &CancelToken::default()).expect("calibrates");
     assert!(kept.views.iter().all(|view| view.corners_aside.is_empty()));
     assert!(kept.rms_px > Some(5.0), "{:?}", kept.rms_px);
 }

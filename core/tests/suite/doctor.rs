@@ -7,10 +7,11 @@ mod faults;
 
 use handeye_core::diagnose::doctor::diagnose;
 use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
+use handeye_core::diagnose::{Calibration, calibrate, calibrate_with, examine};
 use handeye_core::estimate::claim::{Alternative, Claim};
 use handeye_core::estimate::handeye::Mode;
 use handeye_core::estimate::handeye::closed_form;
-use handeye_core::estimate::{Calibration, Method, Observations, TargetSize, ViewStatus, calibrate};
+use handeye_core::estimate::{Fit, Method, Observations, Options, TargetSize, ViewStatus, fit};
 use handeye_core::geometry::frames::Pose;
 use handeye_core::geometry::planar_pose;
 use handeye_core::plan::guided::GuidedOptions;
@@ -93,11 +94,11 @@ fn an_exact_simulation_has_no_outlier_no_finding_and_no_printed_zero() {
         for (estimated, seed) in [(false, 1), (false, 2), (true, 3), (true, 4)] {
             let observations = simulated(mode, estimated, 40 + seed);
             let cancel = CancelToken::default();
-            let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("solves");
+            let calibration = calibrate(&observations, Method::Joint, &cancel).expect("solves");
             let out = calibration.views.iter().filter(|view| view.status != ViewStatus::Used).count();
             let aside: usize = calibration.views.iter().map(|view| view.corners_aside.len()).sum();
             assert_eq!((out, aside), (0, 0), "{mode:?} {seed}");
-            let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+            let diagnosis = calibration.diagnosis();
             let of_noise = |finding: &&Finding| {
                 use FindingCode as C;
                 let geometry =
@@ -168,8 +169,8 @@ fn the_scale_is_estimated_within_its_uncertainty_with_the_lens_given_estimated_o
 fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline() {
     let examined = |observations: &Observations| {
         let cancel = CancelToken::default();
-        let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("solves");
-        let diagnosis = diagnose(observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+        let calibration = calibrate(observations, Method::Joint, &cancel).expect("solves");
+        let diagnosis = calibration.diagnosis().clone();
         (calibration, diagnosis)
     };
     let mut told_of_size = 0;
@@ -197,7 +198,7 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
             // bent board something else may be found beside it.
             let is_moved = calibration.moved_m().is_some();
             let right = if estimated { is_moved || scale == 0.0 } else { is_moved == (scale > 0.0) };
-            assert!(right, "{mode:?} {seed}: {:?}", calibration.claim);
+            assert!(right, "{mode:?} {seed}: {:?}", calibration.claim());
         }
     }
     assert!(told_of_size >= 6, "nothing is compared: {told_of_size}");
@@ -210,7 +211,7 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
     let setup = Setup { arm_error: ArmError::Affine(per_metre), ..Setup::new(Mode::EyeInHand, 20, 950) };
     let observations = session(&setup);
     let cancel = CancelToken::default();
-    let calibrated = calibrate(&observations, Method::Joint, &cancel).expect("solves");
+    let calibrated = fit(&observations, Method::Joint, &cancel).expect("solves");
     let joint = calibrated.joint.as_ref().expect("a joint estimate");
     let size = joint.size.clone().expect("the robot moved");
     assert!(joint.field.is_some() && size.is_determined() && joint.open_size().is_none(), "{size:?}");
@@ -220,9 +221,9 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
     let with = Alternative { shift: [0.005, 0.0, 0.0, 0.0, 0.0, 0.0].into(), ..size.with.clone() };
     let open = TargetSize { scale: 1.02, sigma: 0.02, with, ..size };
     unsure.joint.as_mut().expect("a joint estimate").size = Some(open);
-    let diagnosed = |mut calibration: Calibration| {
-        let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
-        let field = diagnosis.findings.iter().find(|finding| finding.code == FindingCode::RobotField);
+    let diagnosed = |fit: Fit| {
+        let calibration = examine(&observations, fit, &FindingOptions::default(), &cancel).expect("not cancelled");
+        let field = calibration.diagnosis().findings.iter().find(|finding| finding.code == FindingCode::RobotField);
         (calibration.tip_error_95_m().expect("stated"), field.expect("it has a field").to_string())
     };
     let ((sure_m, sure), (open_m, open)) = (diagnosed(calibrated), diagnosed(unsure));
@@ -280,7 +281,7 @@ fn what_was_not_tested_is_said_and_never_called_healthy() {
     let observations = session(&Setup::new(Mode::EyeInHand, 14, 802));
     let cancel = CancelToken::default();
     cancel.cancel();
-    let cancelled = diagnose(&observations, None, &FindingOptions::default(), &cancel);
+    let cancelled = diagnose(&observations, &FindingOptions::default(), &cancel);
     assert_eq!(cancelled.untested.as_deref(), Some("cancelled"));
     let mut camera_alone = observations.clone();
     camera_alone.mode = None;
@@ -304,9 +305,8 @@ fn the_weakest_direction_is_named_where_tilts_are_small() {
 /// The calibration as the command line makes it, with what may be claimed for it.
 fn claimed(observations: &Observations) -> Calibration {
     let cancel = CancelToken::default();
-    let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("an answer, right or wrong");
-    diagnose(observations, Some(&mut calibration), &FindingOptions::with_goal_mm(Some(1.0)), &cancel);
-    calibration
+    let goal = FindingOptions::with_goal_mm(Some(1.0));
+    calibrate_with(observations, Method::Joint, Options::default(), &goal, &cancel).expect("an answer, right or wrong")
 }
 
 #[test]
@@ -350,9 +350,8 @@ fn no_error_is_stated_where_the_data_contradict_themselves() {
     for fault in [4, 5] {
         let (observations, code) = faults::faulty(fault, 1.0, 5000);
         let cancel = CancelToken::default();
-        let Ok(mut calibration) = calibrate(&observations, Method::Joint, &cancel) else { continue };
-        let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
-        assert!(diagnosis.findings.iter().any(|f| f.code == code && f.severity == Severity::Problem));
+        let Ok(calibration) = calibrate(&observations, Method::Joint, &cancel) else { continue };
+        assert!(calibration.diagnosis().findings.iter().any(|f| f.code == code && f.severity == Severity::Problem));
         assert_eq!(calibration.tip_error_95_m(), None, "{code:?}");
         assert!(calibration.modelled_error_95_m().is_some());
         let json = calibration.to_result("", None, std::collections::BTreeMap::new());
@@ -364,12 +363,18 @@ fn no_error_is_stated_where_the_data_contradict_themselves() {
 fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice() {
     let setup = Setup::new(Mode::EyeInHand, 20, 710).with(Fault { scale: -0.04, ..Fault::default() });
     let (observations, cancel) = (session(&setup), CancelToken::default());
-    let mut calibration = calibrate(&observations, Method::Joint, &cancel).expect("an answer");
+    let fit = fit(&observations, Method::Joint, &cancel).expect("an answer");
+    let calibration = examine(&observations, fit.clone(), &FindingOptions::default(), &cancel).expect("not cancelled");
     // The noise alone would reach it.
     let goal_mm = 1.1e3 * calibration.modelled_error_95_m().expect("stated");
     let options = FindingOptions::with_goal_mm(Some(goal_mm));
-    let found = diagnose(&observations, Some(&mut calibration), &options, &cancel).findings;
-    let goal = found.iter().find(|f| f.code == FindingCode::GoalNotReached).expect("it is not reached");
+    let calibration = examine(&observations, fit, &options, &cancel).expect("not cancelled");
+    let goal = calibration
+        .diagnosis()
+        .findings
+        .iter()
+        .find(|f| f.code == FindingCode::GoalNotReached)
+        .expect("it is not reached");
     assert!(goal.to_string().contains("More views do not help"), "{goal}");
     assert!(goal.value("expected_error_95").expect("stated") > 15.0, "{goal:?}");
 }
@@ -398,7 +403,7 @@ fn a_unit_that_was_stated_wrongly_is_named() {
     };
     let inverse = |pose: Isometry3<f64>| vector(pose.inverse()).inverse();
     let cancel = CancelToken::default();
-    let found = |session: &Observations| diagnose(session, None, &FindingOptions::default(), &cancel).findings;
+    let found = |session: &Observations| diagnose(session, &FindingOptions::default(), &cancel).findings;
     for change in [&vector as &dyn Fn(Isometry3<f64>) -> Isometry3<f64>, &rpy, &inverse] {
         let findings = found(&changed(change));
         let named = findings.iter().find(|f| f.code == FindingCode::WrongAngleUnit).expect("the unit is named");
@@ -434,7 +439,7 @@ fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor
     let cancel = CancelToken::default();
     let (true_mount_from_camera, _) = faulty::links(Mode::EyeInHand);
     for method in [Method::Joint, Method::ClosedForm("park_martin")] {
-        let mut calibration = calibrate(&observations, method, &cancel).expect("an answer");
+        let calibration = calibrate(&observations, method, &cancel).expect("an answer");
         let renumbered = calibration.views.iter().filter(|view| view.quarter_turns != 0).count();
         assert_eq!(renumbered, 4, "{method:?}");
         for result in &calibration.methods {
@@ -443,8 +448,8 @@ fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor
             // The least robust of them is off by a centimetre with all views as they should be.
             assert!(off_m < 0.03, "{method:?}: {} is off by {off_m} m", result.name);
         }
-        let diagnosis = diagnose(&observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
-        let alarms: Vec<_> = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning).collect();
+        let alarms: Vec<_> =
+            calibration.diagnosis().findings.iter().filter(|f| f.severity >= Severity::Warning).collect();
         assert!(alarms.iter().all(|f| f.code == FindingCode::Renumbered), "{method:?}: {alarms:?}");
     }
 }

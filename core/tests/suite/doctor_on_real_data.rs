@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use handeye_core::diagnose::calibrate;
 use handeye_core::diagnose::doctor::{Detail, Diagnosis, diagnose};
 use handeye_core::diagnose::findings::{FindingCode, FindingOptions, Severity};
-use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView};
 use handeye_core::geometry::camera::Distortion;
 use handeye_core::progress::CancelToken;
 use handeye_core::project::dataset::Dataset;
@@ -60,8 +61,10 @@ fn diagnosis(data: &Path, name: &str, detector: &str) -> Diagnosis {
         views,
     };
     let cancel = CancelToken::default();
-    let mut calibration = calibrate(&observations, Method::Joint, &cancel).ok();
-    let diagnosis = diagnose(&observations, calibration.as_mut(), &FindingOptions::default(), &cancel);
+    let diagnosis = match calibrate(&observations, Method::Joint, &cancel) {
+        Ok(calibration) => calibration.diagnosis().clone(),
+        Err(_) => diagnose(&observations, &FindingOptions::default(), &cancel),
+    };
     println!("{name}\n{}", diagnosis.report(Detail::All));
     diagnosis
 }

@@ -4,10 +4,11 @@
 #[path = "../../studies/lens_claims/scene.rs"]
 mod scene;
 
-use handeye_core::diagnose::doctor::{Diagnosis, diagnose};
-use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
+use handeye_core::diagnose::doctor::Diagnosis;
+use handeye_core::diagnose::findings::{Finding, FindingCode, Severity};
+use handeye_core::diagnose::{Calibration, calibrate};
 use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
+use handeye_core::estimate::{Method, Observations};
 use handeye_core::progress::CancelToken;
 use scene::Scene;
 
@@ -16,8 +17,8 @@ const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
 /// As the command line makes it.
 fn examined(observations: &Observations) -> (Calibration, Diagnosis) {
     let cancel = CancelToken::default();
-    let mut calibration = calibrate(observations, Method::Joint, &cancel).expect("calibrates");
-    let diagnosis = diagnose(observations, Some(&mut calibration), &FindingOptions::default(), &cancel);
+    let calibration = calibrate(observations, Method::Joint, &cancel).expect("calibrates");
+    let diagnosis = calibration.diagnosis().clone();
     (calibration, diagnosis)
 }
 

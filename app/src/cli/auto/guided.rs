@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use handeye_core::diagnose::doctor;
-use handeye_core::diagnose::findings::FindingOptions;
-use handeye_core::estimate::{Calibration, Method, Observations, calibrate};
+use handeye_core::diagnose::{Calibration, calibrate};
+use handeye_core::estimate::{Method, Observations};
 use handeye_core::plan::Surroundings;
 use handeye_core::plan::guided::choose::{Proposal, Robot};
-use handeye_core::plan::guided::{Ending, Guide, Known, LEAST_VIEWS, Next};
+use handeye_core::plan::guided::{Ending, Guide, Known, Next};
 use handeye_core::progress::CancelToken;
 use handeye_core::project::session::CaptureId;
 use handeye_core::project::taught_poses::Goal;
@@ -165,16 +164,12 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         Ok(true)
     }
 
-    /// What the captures give, with what speaks against it where there are enough to end.
+    /// What the captures give, with what speaks against it.
     fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
         let document = self.sequence.session.document();
         let observations = document.observations(self.image_size, |id| self.sights.get(&id).cloned()).observations;
         let cancel: &CancelToken = self.sequence.cancel;
-        let mut calibration = calibrate(&observations, Method::Joint, cancel).ok();
-        if observations.views.len() >= LEAST_VIEWS {
-            // It learns which error may be stated.
-            doctor::diagnose(&observations, calibration.as_mut(), &FindingOptions::default(), cancel);
-        }
+        let calibration = calibrate(&observations, Method::Joint, cancel).ok();
         self.check_cancelled()?;
         Ok((observations, calibration))
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_core::depth::{ColourMap, DepthImage};
+use handeye_core::diagnose::Calibration;
 use handeye_core::diagnose::findings::{self, Finding, FindingOptions};
 use handeye_core::estimate::handeye::screening::Distance;
 use handeye_core::estimate::handeye::{HandEye, Mode};
@@ -228,7 +229,7 @@ pub fn solved() -> Model {
     let mut model = captured();
     let observations = observations();
     let cancel = CancelToken::default();
-    let calibration = estimate::calibrate(&observations, Method::Joint, &cancel).expect("a calibration");
+    let calibration = Calibration::as_modelled(estimate::fit(&observations, Method::Joint, &cancel).expect("a fit"));
     assert!(matches!(calibration.hand_eye, Some(HandEye::EyeInHand { .. })));
     let mut result = calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
     result.truth = truth::comparison(&result, &tip_from_camera(), &intrinsics());

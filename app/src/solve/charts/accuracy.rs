@@ -17,7 +17,7 @@ use crate::{text, tr};
 pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let calibration = model.solve.solved.as_ref().map(|solved| &solved.calibration);
-    if calibration.is_some_and(|calibration| calibration.claim != Claim::AsModelled) {
+    if calibration.is_some_and(|calibration| *calibration.claim() != Claim::AsModelled) {
         // The curve is that of the noise alone.
         instead_ui(ui, tr!(language, "More poses do not help until what was found is corrected"));
         return;

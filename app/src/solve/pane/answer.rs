@@ -46,7 +46,7 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
     // With something found that is not in the model the covariance is no error of the answer.
     let covariance = solved.calibration.hand_eye_covariance();
-    let covariance_withheld = covariance.is_some() && solved.calibration.claim != Claim::AsModelled;
+    let covariance_withheld = covariance.is_some() && *solved.calibration.claim() != Claim::AsModelled;
     let covariance = covariance.filter(|_| !covariance_withheld);
     let within = covariance.map(|c| Within95::new(&pose, c, law));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);

@@ -57,7 +57,7 @@ pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
         let point = joint.reference_point;
         (found.isometry().transform_point(&point) - truth.isometry().transform_point(&point)).norm()
     });
-    let stated = solved.calibration.hand_eye_covariance().filter(|_| solved.calibration.claim == Claim::AsModelled);
+    let stated = solved.calibration.hand_eye_covariance().filter(|_| *solved.calibration.claim() == Claim::AsModelled);
     let is_within = stated.and_then(|covariance| {
         let error = se3::log((found.inverse() * truth).isometry());
         let weighted = Cholesky::new(*covariance)?.solve(&error);

@@ -107,7 +107,9 @@ fn the_camera_in_the_tip_is_in_millimetres_with_its_uncertainty() {
 
 #[test]
 fn with_something_found_no_uncertainty_is_stated_for_an_axis_and_the_reason_is_not_the_method() {
-    let pane = driven(sample::with_answer(|solved| solved.calibration.claim = Claim::Moved(Vec::new())));
+    let pane = driven(sample::with_answer(|solved| {
+        solved.calibration = solved.calibration.clone().claiming(Claim::Moved(Vec::new()))
+    }));
     assert!(pane.sees("With what was found below no ± can be stated for each axis."));
     assert!(!pane.sees("A closed form states no uncertainty.") && !pane.sees("± 95 % [mm]"));
 }
@@ -164,7 +166,7 @@ fn keeping_all_views_is_one_click() {
 }
 
 /// What the estimate found out, all of it.
-fn with_everything_found(calibration: &mut handeye_core::estimate::Calibration) {
+fn with_everything_found(calibration: &mut handeye_core::diagnose::Calibration) {
     for view in calibration.views.iter_mut().take(2) {
         view.status = ViewStatus::Outlier;
         view.distance = Some(Distance { of_limit: 4.0, metres: 8e-3, radians: 0.02 });
@@ -245,7 +247,7 @@ fn every_finding() -> Vec<findings::Finding> {
     let good = observations(&model);
     let calibration = model.solve.current().expect("solved").calibration.clone();
     let mut found = Vec::new();
-    let mut judge = |observations: &Observations, change: &dyn Fn(&mut handeye_core::estimate::Calibration), goal| {
+    let mut judge = |observations: &Observations, change: &dyn Fn(&mut handeye_core::diagnose::Calibration), goal| {
         let mut calibration = calibration.clone();
         change(&mut calibration);
         found.extend(findings::findings(observations, Some(&calibration), &FindingOptions::with_goal_mm(Some(goal))));
@@ -354,7 +356,7 @@ fn what_the_doctor_says_of_a_session_is_said_in_both_languages() {
             change(n, &mut pose);
             view.base_from_tip = Some(Pose::from_isometry(pose));
         }
-        let diagnosis = doctor::diagnose(&observations, None, &FindingOptions::default(), &CancelToken::default());
+        let diagnosis = doctor::diagnose(&observations, &FindingOptions::default(), &CancelToken::default());
         found.extend(diagnosis.findings);
     };
     examine(&|_, pose| *pose = pose.inverse());

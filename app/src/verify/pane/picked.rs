@@ -42,7 +42,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         parts::stated_ui(ui, tr!(language, "Its length [mm]"), &numbers::fixed(difference_mm.norm(), 2, 8));
     }
     let solved = model.solve.solved.as_ref();
-    let modelled = solved.is_none_or(|solved| solved.calibration.claim == Claim::AsModelled);
+    let modelled = solved.is_none_or(|solved| *solved.calibration.claim() == Claim::AsModelled);
     let meaning = if modelled {
         tr!(
             language,

@@ -10,7 +10,7 @@ use super::screen::Candidate;
 use super::select::Selection;
 use crate::diagnose::findings::FindingCode;
 use crate::estimate::claim::{Alternative, Claim};
-use crate::estimate::{Calibration, JointFit, ViewStatus};
+use crate::estimate::{self, JointFit, ViewStatus};
 use crate::geometry::frames::{Camera, Mount, Pose};
 use crate::geometry::se3;
 
@@ -21,7 +21,7 @@ use crate::geometry::se3;
 /// calibration misses. A fit of the linear model without the hypotheses is not the answer: where the model is wrong, pose by
 /// pose and all corners together are wrong in different ways. Explanations that are as good as the first are alternatives of
 /// their own.
-pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Claim {
+pub(super) fn claim(selection: &Selection<'_>, calibration: &estimate::Fit) -> Claim {
     let model = &selection.model;
     let counted = |effect: Effect| counts_on(calibration, effect);
     let out: Vec<usize> =
@@ -67,7 +67,7 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &Calibration) -> Cla
 }
 
 /// What may be stated where sessions share a lens and have several: the answer may be off by what its own would move it.
-pub(super) fn with_own_lens(claim: Claim, calibration: &Calibration) -> Claim {
+pub(super) fn with_own_lens(claim: Claim, calibration: &estimate::Fit) -> Claim {
     let shared = calibration.shared_lens.as_ref().filter(|shared| shared.has_others());
     match shared {
         Some(shared) => also(claim, shared.with_own_lens.clone()),
@@ -77,7 +77,7 @@ pub(super) fn with_own_lens(claim: Claim, calibration: &Calibration) -> Claim {
 
 /// What may be stated where the robot's field leaves the size of the target open: a size that is off as prints and rulers are would
 /// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it.
-pub(super) fn with_open_size(claim: Claim, calibration: &Calibration) -> Claim {
+pub(super) fn with_open_size(claim: Claim, calibration: &estimate::Fit) -> Claim {
     let size = calibration.joint.as_ref().and_then(JointFit::open_size);
     match size {
         Some(size) => also(claim, size.with.clone()),
@@ -94,7 +94,7 @@ fn also(claim: Claim, alternative: Alternative) -> Claim {
 }
 
 /// Whether the answer is estimated with an effect.
-fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
+fn counts_on(calibration: &estimate::Fit, effect: Effect) -> bool {
     let Some(joint) = &calibration.joint else {
         return effect == Effect::Scale && calibration.pose_fit.is_some_and(|fit| fit.shape.is_some());
     };
@@ -107,7 +107,7 @@ fn counts_on(calibration: &Calibration, effect: Effect) -> bool {
 }
 
 /// Whether the answer counts on what a hypothesis says.
-pub(super) fn is_applied(calibration: &Calibration, hypothesis: &Hypothesis) -> bool {
+pub(super) fn is_applied(calibration: &estimate::Fit, hypothesis: &Hypothesis) -> bool {
     match hypothesis.code {
         FindingCode::BoardBent => counts_on(calibration, Effect::Warp),
         FindingCode::WrongScale => counts_on(calibration, Effect::Scale),
@@ -118,7 +118,7 @@ pub(super) fn is_applied(calibration: &Calibration, hypothesis: &Hypothesis) -> 
 }
 
 /// Whether the answer is without a view.
-fn is_out(calibration: &Calibration, name: &str) -> bool {
+fn is_out(calibration: &estimate::Fit, name: &str) -> bool {
     calibration.views.iter().any(|view| view.name == name && view.status != ViewStatus::Used)
 }
 

@@ -34,9 +34,10 @@ mod words;
 
 use serde::Serialize;
 
+use crate::diagnose::Calibration;
 use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
 use crate::estimate::claim::Claim;
-use crate::estimate::{Calibration, Observations};
+use crate::estimate::{Fit, Observations};
 use crate::progress::Work;
 use crate::targets::observation;
 use crate::wording::Text;
@@ -96,7 +97,7 @@ pub struct Estimate {
 }
 
 /// The diagnosis of a session.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Diagnosis {
     /// Everything found, the most severe first; accepted hypotheses are among them.
     pub findings: Vec<Finding>,
@@ -126,53 +127,63 @@ const PLAUSIBLE: (f64, f64) = (2e-3, 8.4e-3);
 /// A misfit beyond this part of the board's distance is beyond the linear model.
 const HOPELESS: f64 = 0.2;
 
-/// Examines a session.
+/// What is wrong with observations of which there is no fit, or whose fit does not matter: the hypotheses do not depend on it.
 ///
-/// `calibration` is the joint estimate of these observations, where there is one; the hypotheses do not depend on it. It
-/// learns which error may be stated: see [`Claim`].
 /// `work` is a `&CancelToken`, or a [`Work`]; when it is cancelled [`Diagnosis::untested`] says so.
-pub fn diagnose<'a>(
-    observations: &Observations,
-    mut calibration: Option<&mut Calibration>,
-    options: &FindingOptions,
-    work: impl Into<Work<'a>>,
-) -> Diagnosis {
-    let work = work.into();
-    let repaired = calibration.as_deref().and_then(|calibration| as_found(observations, calibration));
-    let observations = repaired.as_ref().unwrap_or(observations);
-    let mut diagnosis = Diagnosis { findings: Vec::new(), hypotheses: Vec::new(), untested: None };
-    if let Err(why) = examine(observations, calibration.as_deref_mut(), &mut diagnosis, &work) {
+pub fn diagnose<'a>(observations: &Observations, options: &FindingOptions, work: impl Into<Work<'a>>) -> Diagnosis {
+    let mut diagnosis = Diagnosis::default();
+    if let Err(why) = examine(observations, None, &mut diagnosis, &work.into()) {
         diagnosis.untested = Some(why);
     }
-    if let Some(calibration) = calibration.as_deref_mut() {
-        let claim = std::mem::take(&mut calibration.claim);
-        calibration.claim = claim::with_open_size(claim::with_own_lens(claim, calibration), calibration);
+    diagnosis.with(findings::findings(observations, None, options))
+}
+
+/// What is wrong with observations and their fit, and which error may be stated for it. Only half of it when `work` is cancelled.
+pub(super) fn examined(
+    observations: &Observations,
+    fit: Fit,
+    options: &FindingOptions,
+    work: &Work<'_>,
+) -> Calibration {
+    let repaired = as_found(observations, &fit);
+    let observations = repaired.as_ref().unwrap_or(observations);
+    let mut diagnosis = Diagnosis::default();
+    let mut found = (&fit, Claim::AsModelled);
+    if let Err(why) = examine(observations, Some(&mut found), &mut diagnosis, work) {
+        diagnosis.untested = Some(why);
     }
-    if let Some(calibration) = calibration.as_deref_mut()
-        && diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem)
-    {
-        calibration.claim = Claim::Nothing;
+    let (_, claim) = found;
+    let mut claim = claim::with_open_size(claim::with_own_lens(claim, &fit), &fit);
+    if diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem) {
+        claim = Claim::Nothing;
     }
-    // After the claim: the goal is judged by it. Before what was examined, so that what the estimate has already acted
-    // upon is said as the estimate says it.
-    let of_estimate = findings::findings(observations, calibration.as_deref(), options);
-    diagnosis.findings.splice(0..0, of_estimate);
-    // What the estimate has already acted upon is said once.
-    let mut said: Vec<FindingCode> = Vec::new();
-    diagnosis.findings.retain(|finding| {
-        let once =
-            matches!(finding.code, FindingCode::OutlierView | FindingCode::BoardBent | FindingCode::OutlierCorners);
-        let new = !(once && said.contains(&finding.code));
-        said.push(finding.code);
-        new
-    });
-    findings::sort(&mut diagnosis.findings);
-    diagnosis
+    let calibration = Calibration { fit, claim, diagnosis: Diagnosis::default() };
+    // After the claim: the goal is judged by it.
+    let of_estimate = findings::findings(observations, Some(&calibration), options);
+    Calibration { diagnosis: diagnosis.with(of_estimate), ..calibration }
+}
+
+impl Diagnosis {
+    /// With what the estimate says. It comes before what was examined, so that what the estimate has already acted upon is said as
+    /// the estimate says it, and said once.
+    fn with(mut self, of_estimate: Vec<Finding>) -> Self {
+        self.findings.splice(0..0, of_estimate);
+        let mut said: Vec<FindingCode> = Vec::new();
+        self.findings.retain(|finding| {
+            let once =
+                matches!(finding.code, FindingCode::OutlierView | FindingCode::BoardBent | FindingCode::OutlierCorners);
+            let new = !(once && said.contains(&finding.code));
+            said.push(finding.code);
+            new
+        });
+        findings::sort(&mut self.findings);
+        self
+    }
 }
 
 /// The observations with the corners numbered as the calibration found them to be, and where they would be if the target were
 /// printed as drawn; `None` when that changes nothing.
-fn as_found(observations: &Observations, calibration: &Calibration) -> Option<Observations> {
+fn as_found(observations: &Observations, calibration: &Fit) -> Option<Observations> {
     let print = calibration.joint.as_ref().and_then(|joint| joint.print.as_ref()).zip(calibration.intrinsics());
     if print.is_none() && calibration.views.iter().all(|view| view.quarter_turns == 0) {
         return None;
@@ -199,12 +210,13 @@ fn as_found(observations: &Observations, calibration: &Calibration) -> Option<Ob
 
 fn examine(
     observations: &Observations,
-    calibration: Option<&mut Calibration>,
+    fit: Option<&mut (&Fit, Claim)>,
     diagnosis: &mut Diagnosis,
     work: &Work<'_>,
 ) -> Result<(), String> {
     let cancelled = || "cancelled".to_owned();
-    let lens = calibration.as_deref().and_then(|calibration| calibration.lens_by_corners);
+    let (calibration, claim) = fit.map(|(fit, claim)| (*fit, claim)).unzip();
+    let lens = calibration.and_then(|calibration| calibration.lens_by_corners);
     let sight = views::SessionViews::new(observations, lens).map_err(|why| why.to_string())?;
     diagnosis.findings.extend(words::not_finite(&sight));
     diagnosis.findings.extend(words::wrong_corners(&sight));
@@ -233,20 +245,20 @@ fn examine(
     let selection = select::select(&sight, &start, work).ok_or_else(|| {
         if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }
     })?;
-    let size = calibration.as_deref().and_then(|calibration| calibration.joint.as_ref()?.size.as_ref());
+    let size = calibration.and_then(|calibration| calibration.joint.as_ref()?.size.as_ref());
     let selection = match size {
         Some(size) => selection.with_size(size),
         None => selection,
     };
     let mut fine = words::fine(&selection);
-    if let Some(calibration) = calibration.as_deref() {
+    if let Some(calibration) = calibration {
         for h in &mut fine {
             h.applied = claim::is_applied(calibration, h);
         }
     }
-    let noise = calibration.as_deref().and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
-    if let Some(calibration) = calibration {
-        calibration.claim = claim::claim(&selection, calibration);
+    let noise = calibration.and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
+    if let Some((calibration, claim)) = calibration.zip(claim) {
+        *claim = claim::claim(&selection, calibration);
     }
     diagnosis.findings.extend(fine.iter().filter(|h| h.accepted).map(words::finding_of));
     let beside = fine.iter().any(|h| h.accepted && !h.applied);

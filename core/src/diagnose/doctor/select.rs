@@ -179,7 +179,7 @@ mod tests {
             let start = gross::gross(&sight, &(&cancel).into()).expect("not cancelled").as_given.expect("a solution");
             let selection = select(&sight, &start, &(&cancel).into()).expect("selected");
             assert!(selection.model.work() < 2 * MOST_WORK, "{views}: {}", selection.model.work());
-            let diagnosis = diagnose(&observations, None, &FindingOptions::default(), &cancel);
+            let diagnosis = diagnose(&observations, &FindingOptions::default(), &cancel);
             assert!(!diagnosis.is_healthy());
             assert_eq!(selection.is_ended, diagnosis.untested.is_some_and(|why| why.contains("was ended after")));
         }

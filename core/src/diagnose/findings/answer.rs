@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
+use crate::diagnose::Calibration;
 use crate::estimate::claim::Claim;
-use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus, resolution};
+use crate::estimate::{JointFit, ViewResult, ViewStatus, resolution};
 use crate::geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median};
 use crate::text;
 use crate::wording::{Text, shown};

@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 
 use super::{Finding, FindingCode, Severity};
-use crate::estimate::Calibration;
+use crate::diagnose::Calibration;
 use crate::geometry::se3::skew;
 use crate::text;
 use crate::wording::{Text, shown};

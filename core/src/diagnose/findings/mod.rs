@@ -20,7 +20,8 @@ pub use finding::{Finding, FindingCode, Severity};
 pub use outliers::WIDENING_WORTH_SAYING;
 use serde::Serialize;
 
-use crate::estimate::{Calibration, Observations};
+use crate::diagnose::Calibration;
+use crate::estimate::Observations;
 
 /// One number that supports a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

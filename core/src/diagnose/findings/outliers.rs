@@ -2,7 +2,8 @@
 //! bent target, a widened uncertainty, noise levels that cannot be told apart.
 
 use super::{Finding, FindingCode, Severity, listed};
-use crate::estimate::{Calibration, JointFit, ViewResult, ViewStatus, resolution};
+use crate::diagnose::Calibration;
+use crate::estimate::{JointFit, ViewResult, ViewStatus, resolution};
 use crate::text;
 use crate::wording::{Text, shown};
 

@@ -1,7 +1,7 @@
 //! The finding on sessions that share a lens and do not agree on it.
 
 use super::{Finding, FindingCode, Severity};
-use crate::estimate::Calibration;
+use crate::diagnose::Calibration;
 use crate::estimate::shared_lens::OddSession;
 use crate::text;
 use crate::wording::{Text, shown};

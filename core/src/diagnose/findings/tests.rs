@@ -3,7 +3,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use super::*;
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::Noise;
-use crate::estimate::{CameraKnowledge, Method, Options, calibrate, calibrate_with};
+use crate::estimate::{CameraKnowledge, Method, Options, fit, fit_with};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::Pose;
 use crate::progress::CancelToken;
@@ -11,7 +11,7 @@ use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 use crate::wording::Text;
 
 fn solve(observations: &Observations) -> Calibration {
-    calibrate(observations, Method::Joint, &CancelToken::default()).expect("solves")
+    Calibration::as_modelled(fit(observations, Method::Joint, &CancelToken::default()).expect("solves"))
 }
 
 fn of_trial(t: &Trial, free: bool, options: &FindingOptions) -> Vec<Finding> {
@@ -23,7 +23,8 @@ fn of_trial(t: &Trial, free: bool, options: &FindingOptions) -> Vec<Finding> {
 fn of_all_views(t: &Trial) -> Vec<Finding> {
     let observations = t.observations(false);
     let keep = Options { keep_outliers: true, ..Options::default() };
-    let calibration = calibrate_with(&observations, Method::Joint, keep, &CancelToken::default()).expect("solves");
+    let fit = fit_with(&observations, Method::Joint, keep, &CancelToken::default()).expect("solves");
+    let calibration = Calibration::as_modelled(fit);
     findings(&observations, Some(&calibration), &FindingOptions::default())
 }
 
@@ -279,7 +280,7 @@ fn a_lens_that_folds_back_is_named_beyond_the_target_and_refused_within_it() {
     let mut observations = set(10, 87).observations(false);
     let folding = Intrinsics { distortion: Distortion::BrownConrady([-4.0, 0.0, 0.0, 0.0, 0.0]), ..camera() };
     observations.camera = CameraKnowledge::Fixed(folding);
-    let outcome = calibrate(&observations, Method::Joint, &CancelToken::default());
+    let outcome = fit(&observations, Method::Joint, &CancelToken::default());
     let Err(error) = outcome.map(drop) else { panic!("that is no lens") };
     let error = error.to_string();
     for part in ["the known camera", "[-4.0", "folds back 112 px", "the target was seen as far as"] {

@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 
 use super::{Finding, FindingCode, Severity, listed};
+use crate::diagnose::Calibration;
 use crate::diagnose::coverage::{Coverage, CoveredView};
 use crate::estimate::handeye::motion::MIN_VIEWS;
 use crate::estimate::handeye::{HandEyeError, motion};
-use crate::estimate::{Calibration, CameraKnowledge, GOOD_VIEWS, Observations, ObservedView, ViewStatus};
+use crate::estimate::{CameraKnowledge, GOOD_VIEWS, Observations, ObservedView, ViewStatus};
 use crate::geometry::frames::{Anchor, Mount, Pose};
 use crate::text;
 use crate::wording::Text;

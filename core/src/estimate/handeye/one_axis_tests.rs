@@ -4,7 +4,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::estimate::{CalibrateError, CameraKnowledge, Method, Observations, ObservedView, calibrate};
+use crate::estimate::{CalibrateError, CameraKnowledge, Method, Observations, ObservedView, fit};
 use crate::geometry::frames::{Anchor, Target};
 use crate::geometry::se3;
 use crate::progress::CancelToken;
@@ -113,7 +113,7 @@ fn a_calibration_about_one_axis_is_refused_with_what_it_determines_in_both_modes
             camera: CameraKnowledge::NOTHING,
             views: views.collect(),
         };
-        let error = calibrate(&observations, Method::Joint, &CancelToken::default()).expect_err("one axis");
+        let error = fit(&observations, Method::Joint, &CancelToken::default()).expect_err("one axis");
         let CalibrateError::OneAxis(found) = &error else { panic!("{error}") };
         let (place, turn) = errors(found, &session.mount_from_camera);
         assert!(place.norm() < 1e-7 && turn.norm() < 1e-7, "{place} {turn}");

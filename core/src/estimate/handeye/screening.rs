@@ -94,7 +94,7 @@ impl From<&Judged> for Distance {
 }
 
 /// A solution, the views that it is from, ascending, and how far every view is from it.
-pub(crate) struct Fit<S> {
+pub(crate) struct ScreenedFit<S> {
     pub solution: S,
     pub kept: Vec<usize>,
     pub judged: Vec<Judged>,
@@ -114,7 +114,7 @@ pub(crate) fn limit(views: usize, freedom: f64) -> f64 {
 ///
 /// # Errors
 /// As [`Estimator::fit`] of all views.
-pub(crate) fn screened<E: Estimator>(estimator: &E, misfits: &[f64]) -> Result<Fit<E::Solution>, HandEyeError> {
+pub(crate) fn screened<E: Estimator>(estimator: &E, misfits: &[f64]) -> Result<ScreenedFit<E::Solution>, HandEyeError> {
     let views = misfits.len();
     let all: Vec<usize> = (0..views).collect();
     let fit_all = || fitted(estimator, all.clone(), None);
@@ -155,13 +155,13 @@ fn fitted<E: Estimator>(
     estimator: &E,
     kept: Vec<usize>,
     near: Option<&E::Solution>,
-) -> Result<Fit<E::Solution>, HandEyeError> {
+) -> Result<ScreenedFit<E::Solution>, HandEyeError> {
     let solution = estimator.fit(&kept, near)?;
     let judged = estimator.judge(&solution, &kept)?;
-    Ok(Fit { solution, kept, judged })
+    Ok(ScreenedFit { solution, kept, judged })
 }
 
-impl<S> Fit<S> {
+impl<S> ScreenedFit<S> {
     /// The views that are outliers by their distances.
     fn wrong(&self) -> Vec<usize> {
         let of_limit: Vec<f64> = self.judged.iter().map(|j| j.squared / j.limit).collect();
@@ -174,7 +174,10 @@ impl<S> Fit<S> {
 }
 
 /// Fits and judges in turn until the same views are kept twice.
-fn settle<E: Estimator>(estimator: &E, mut fit: Fit<E::Solution>) -> Result<Fit<E::Solution>, HandEyeError> {
+fn settle<E: Estimator>(
+    estimator: &E,
+    mut fit: ScreenedFit<E::Solution>,
+) -> Result<ScreenedFit<E::Solution>, HandEyeError> {
     let mut seen = vec![fit.kept.clone()];
     for _ in 0..ROUNDS {
         let wrong = fit.wrong();
@@ -199,8 +202,8 @@ fn settle<E: Estimator>(estimator: &E, mut fit: Fit<E::Solution>) -> Result<Fit<
 /// times `N` whatever its error, which is less than the limit when `N` is small. Judged from outside nothing bounds it.
 fn without_farthest<E: Estimator>(
     estimator: &E,
-    fit: &Fit<E::Solution>,
-) -> Result<Option<Fit<E::Solution>>, HandEyeError> {
+    fit: &ScreenedFit<E::Solution>,
+) -> Result<Option<ScreenedFit<E::Solution>>, HandEyeError> {
     let of_limit = |i: usize| fit.judged[i].squared / fit.judged[i].limit;
     let farthest = fit.kept.iter().copied().max_by(|&a, &b| of_limit(a).total_cmp(&of_limit(b)));
     let Some(farthest) = farthest.filter(|&i| fit.kept.len() > NEED && of_limit(i) > SUSPECT) else { return Ok(None) };

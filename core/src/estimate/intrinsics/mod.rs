@@ -1,4 +1,4 @@
-//! Calibration of a camera from views of a flat target.
+//! Fit of a camera from views of a flat target.
 //!
 //! # What it estimates
 //! Focal lengths, principal point and distortion of one lens model, the target's pose in every view and, where the corners

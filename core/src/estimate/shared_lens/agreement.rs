@@ -8,7 +8,7 @@
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::{Fit, NamedSession};
+use super::{NamedSession, Refit};
 use crate::estimate::handeye::joint::normal::covariance_of;
 use crate::estimate::handeye::joint::shared_lens::{Fitted, LensEstimate, difference};
 
@@ -62,7 +62,7 @@ struct Differs {
 }
 
 /// Judges sessions by their fits without each other; `None` when a lens is not determined.
-pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>]) -> Option<Agreement> {
+pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Refit>]) -> Option<Agreement> {
     let mut rest: Vec<usize> = (0..alone.len()).collect();
     let (mut p_value, mut odd) = (None, Vec::new());
     while rest.len() > 1 {
@@ -87,7 +87,7 @@ pub(super) fn test(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>]) -> Opti
 }
 
 /// How a session differs from those of `rest` besides it.
-fn differs(sessions: &[NamedSession<'_>], alone: &[Fitted<Fit>], session: usize, rest: &[usize]) -> Option<Differs> {
+fn differs(sessions: &[NamedSession<'_>], alone: &[Fitted<Refit>], session: usize, rest: &[usize]) -> Option<Differs> {
     let own = LensEstimate::by([&alone[session].says])?;
     let others = LensEstimate::by(rest.iter().filter(|other| **other != session).map(|other| &alone[*other].says))?;
     let covariance = own.covariance()? + others.covariance()?;

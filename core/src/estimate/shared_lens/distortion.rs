@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Fit, NamedSession, SharedLensError, fitted};
+use super::{NamedSession, Refit, SharedLensError, fitted};
 use crate::estimate::corners::Session;
 use crate::estimate::handeye::joint::effects::Equations;
 use crate::estimate::handeye::joint::residual_distortion::shared::{
@@ -16,7 +16,7 @@ use crate::targets::observation::View;
 
 /// Sessions with one lens, and with what it does beyond its model where they show it.
 pub struct Together {
-    pub sessions: Vec<Fitted<Fit>>,
+    pub sessions: Vec<Fitted<Refit>>,
     pub lens: LensEstimate,
     shown: Option<(ShownDistortion, Vec<Share>, Equations)>,
 }
@@ -26,7 +26,7 @@ impl Together {
     pub fn new(
         names: &[NamedSession<'_>],
         prepared: &[Session<'_>],
-        sessions: Vec<Fitted<Fit>>,
+        sessions: Vec<Fitted<Refit>>,
         lens: LensEstimate,
         work: &Work<'_>,
     ) -> Result<Self, SharedLensError> {
@@ -42,7 +42,7 @@ impl Together {
             for (session, plain) in next.sessions.iter_mut().zip(&plain) {
                 session.fit.refined.screened.views = corrected(plain, field);
             }
-            let refit = |i: usize, _round: usize, last: &Fit, others: LensEstimate| {
+            let refit = |i: usize, _round: usize, last: &Refit, others: LensEstimate| {
                 again(&prepared[i], last, &others, work).map_err(|error| names[i].fails(error))
             };
             let shared = shared_lens::share(next.sessions.clone(), 0, refit)?;
@@ -67,7 +67,7 @@ impl Together {
         work: &Work<'_>,
     ) -> Result<Option<(Vec<Share>, Equations)>, SharedLensError> {
         let mut shares = Vec::with_capacity(self.sessions.len());
-        for (i, Fitted { fit: Fit { refined, factor }, .. }) in self.sessions.iter().enumerate() {
+        for (i, Fitted { fit: Refit { refined, factor }, .. }) in self.sessions.iter().enumerate() {
             let Some(others) = shared_lens::by_others(&self.sessions, i) else { return Ok(None) };
             let (from, others) = (prepared[i].fitted(refined), others.times(*factor));
             let problem = prepared[i].problem(refined, &from, Some(others.as_prior()));
@@ -104,10 +104,10 @@ impl Together {
 /// A session fitted anew with what the others say of the lens, with the same views, unknowns and widening.
 pub fn again(
     prepared: &Session<'_>,
-    last: &Fit,
+    last: &Refit,
     others: &LensEstimate,
     work: &Work<'_>,
-) -> Result<Fitted<Fit>, crate::estimate::CalibrateError> {
+) -> Result<Fitted<Refit>, crate::estimate::CalibrateError> {
     let others = others.clone().times(last.factor);
     let from = prepared.fitted(&last.refined);
     let problem = prepared.problem(&last.refined, &from, Some(others.as_prior()));

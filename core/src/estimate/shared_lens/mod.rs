@@ -1,7 +1,7 @@
 //! Several sessions of one camera, calibrated together with one lens.
 //!
 //! # What it estimates
-//! The lens that all sessions share, and for each what [`calibrate`](super::calibrate) estimates besides: both links, the
+//! The lens that all sessions share, and for each what [`fit`](super::fit) estimates besides: both links, the
 //! corrections of its robot poses, its noise levels, and where its data show them a bent target and the robot's field. The
 //! result is the optimum of all sessions together, found in rounds over the sessions
 //! (`handeye/joint/shared_lens.rs`).
@@ -23,7 +23,7 @@ use nalgebra::DVector;
 use super::corners::{Prepared, Session};
 use super::refine::Refined;
 use super::uncertainty::widening;
-use super::{CalibrateError, Calibration, CameraKnowledge, Observations, Options};
+use super::{CalibrateError, CameraKnowledge, Fit, Observations, Options};
 use crate::estimate::claim::Alternative;
 use crate::estimate::handeye::HandEyeError;
 use crate::estimate::handeye::joint::print_errors;
@@ -171,7 +171,7 @@ pub fn calibrate_sharing_lens<'a>(
     sessions: &[NamedSession<'_>],
     options: Options,
     work: impl Into<Work<'a>>,
-) -> Result<Vec<Calibration>, SharedLensError> {
+) -> Result<Vec<Fit>, SharedLensError> {
     let work = &work.into();
     check(sessions)?;
     let mut prepared = Vec::with_capacity(sessions.len());
@@ -187,9 +187,9 @@ pub fn calibrate_sharing_lens<'a>(
         alone.push(fitted(prepared, refined, None, None, work).map_err(|error| session.fails(error))?);
     }
     let agreement = agreement::test(sessions, &alone).ok_or(SharedLensError::NoLens)?;
-    let refit = |i: usize, round: usize, last: &Fit, others: LensEstimate| {
+    let refit = |i: usize, round: usize, last: &Refit, others: LensEstimate| {
         let (session, prepared) = (&sessions[i], &prepared[i]);
-        let anew = || -> Result<Fitted<Fit>, CalibrateError> {
+        let anew = || -> Result<Fitted<Refit>, CalibrateError> {
             let others = others.clone().times(last.factor);
             let refined = prepared.refine(Some(others.as_prior()), options, work)?;
             fitted(prepared, refined, Some(others.as_prior()), None, work)
@@ -205,7 +205,7 @@ pub fn calibrate_sharing_lens<'a>(
     let views = shared.iter().map(|session| session.fit.refined.screened.kept.len()).sum();
     let mut calibrations = Vec::with_capacity(sessions.len());
     for (i, prepared) in prepared.into_iter().enumerate() {
-        let Fit { mut refined, factor } = shared[i].fit.clone();
+        let Refit { mut refined, factor } = shared[i].fit.clone();
         let others = shared_lens::by_others(shared, i).ok_or(SharedLensError::NoLens)?.times(factor);
         let from = prepared.fitted(&refined);
         let problem = prepared.problem(&refined, &from, Some(others.as_prior()));
@@ -234,7 +234,7 @@ pub fn calibrate_sharing_lens<'a>(
 
 /// One session's estimate in the rounds.
 #[derive(Clone)]
-struct Fit {
+struct Refit {
     refined: Refined,
     /// What its variances have to be multiplied by, see [`widening`].
     factor: f64,
@@ -253,7 +253,7 @@ fn fitted(
     prior: Option<LensPrior<'_>>,
     factor: Option<f64>,
     work: &Work<'_>,
-) -> Result<Fitted<Fit>, CalibrateError> {
+) -> Result<Fitted<Refit>, CalibrateError> {
     let from = session.fitted(&refined);
     let problem = session.problem(&refined, &from, prior);
     let solution = &refined.screened.solution;
@@ -275,10 +275,10 @@ fn fitted(
         unknown.flatten().and_then(|unknown| says.clone().less(&unknown)).unwrap_or(says)
     };
     let says = says.widened(factor);
-    Ok(Fitted { fit: Fit { refined, factor }, says })
+    Ok(Fitted { fit: Refit { refined, factor }, says })
 }
 
-fn with_own_lens(shared: &JointSolution, alone: &Fit) -> Alternative {
+fn with_own_lens(shared: &JointSolution, alone: &Refit) -> Alternative {
     let own = &alone.refined.screened.solution;
     let (from, to) = (shared.hand_eye.mount_from_camera(), own.hand_eye.mount_from_camera());
     Alternative {

@@ -29,10 +29,11 @@ pub use hold::Hold;
 use nalgebra::Point3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
+use crate::diagnose::Calibration;
 use crate::estimate::claim::Claim;
 use crate::estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, ViewModel};
 use crate::estimate::uncertainty::quality::TipBox;
-use crate::estimate::{Calibration, Observations, ViewStatus};
+use crate::estimate::{Fit, Observations, ViewStatus};
 use crate::geometry::arm::JointValues;
 use crate::geometry::frames::{Base, Pose, Tip};
 use crate::geometry::point_error;
@@ -125,13 +126,18 @@ impl Default for GuidedOptions {
 pub struct Known<'a> {
     /// All views so far.
     pub observations: &'a Observations,
-    /// What they give; `None` while they do not determine an answer. What was found about it speaks by its
-    /// [`Claim`]: see [`diagnose`](crate::diagnose::doctor::diagnose).
+    /// What they give; `None` while they do not determine an answer.
     pub calibration: Option<&'a Calibration>,
     /// The arm; `None` where its chain is not known.
     pub robot: Option<&'a Robot>,
     /// Since the beginning, seconds.
     pub elapsed_s: f64,
+}
+
+impl<'a> Known<'a> {
+    fn fit(&self) -> Option<&'a Fit> {
+        self.calibration.map(|calibration| &**calibration)
+    }
 }
 
 /// What comes next.
@@ -337,7 +343,7 @@ impl Guide {
 
     /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
     pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
-        let used = used_views(known.observations, known.calibration);
+        let used = used_views(known.observations, known.fit());
         if let Some(step) = self.steps.last_mut().filter(|step| step.outcome == Outcome::Captured) {
             let modelled_m = |calibration| modelled_error_m(calibration, self.options.tool_box.as_ref());
             step.achieved_m = known.calibration.and_then(modelled_m);
@@ -440,7 +446,7 @@ impl Guide {
         let target = &known.observations.target;
         let model = ViewModel::new(known.calibration?, target)?;
         let model = model.clone().with_noise(at_least(model.noise(), &LEAST_NOISE));
-        let used = used_views(known.observations, known.calibration);
+        let used = used_views(known.observations, known.fit());
         let ground = self.ground(known, &model, &used, cancel)?;
         let options = ChooseOptions {
             candidates: CHECK_CANDIDATES,
@@ -489,7 +495,7 @@ impl Guide {
     /// small part of the goal, is none that has to be resolved for this goal.
     fn is_sound(&self, calibration: Option<&Calibration>) -> bool {
         let Some(calibration) = calibration else { return false };
-        match &calibration.claim {
+        match calibration.claim() {
             Claim::AsModelled => true,
             Claim::Nothing => false,
             claim @ Claim::Moved(_) => {
@@ -608,11 +614,9 @@ fn upper_level(degrees_of_freedom: f64) -> f64 {
 }
 
 /// Reported tip poses of the views that are in the fit, and the indices of the corners found in them.
-fn used_views(observations: &Observations, calibration: Option<&Calibration>) -> Vec<(Pose<Base, Tip>, Vec<usize>)> {
-    let is_used = |index: usize| {
-        calibration
-            .is_none_or(|calibration| calibration.views.get(index).is_some_and(|view| view.status == ViewStatus::Used))
-    };
+fn used_views(observations: &Observations, fit: Option<&Fit>) -> Vec<(Pose<Base, Tip>, Vec<usize>)> {
+    let is_used =
+        |index: usize| fit.is_none_or(|fit| fit.views.get(index).is_some_and(|view| view.status == ViewStatus::Used));
     let of_view = |(index, view): (usize, &crate::estimate::ObservedView)| {
         let corners = view.corners.as_ref().filter(|_| view.in_fit && is_used(index))?;
         Some((view.base_from_tip?, corners.iter().map(|corner| corner.index).collect()))

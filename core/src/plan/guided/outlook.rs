@@ -11,7 +11,7 @@ impl Guide {
     /// levels as estimated now: with few views they may be off by half.
     pub fn views_left(&self, known: &Known<'_>, plan: &Plan) -> Option<usize> {
         let ratio = self.options.goal_m / error_at_upper_levels(known.calibration?, self.options.tool_box.as_ref())?;
-        let views = used_views(known.observations, known.calibration).len();
+        let views = used_views(known.observations, known.fit()).len();
         let by_error = if ratio >= 1.0 { 0 } else { views_to(ratio, views, plan)? };
         // One answer that is good enough may be luck.
         let left = by_error.max(LEAST_VIEWS.saturating_sub(views)) + IN_A_ROW - 1;

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::estimate::handeye::Mode;
 use crate::estimate::handeye::joint::ViewModel;
-use crate::estimate::{CameraKnowledge, Method, Observations, calibrate};
+use crate::estimate::{self, CameraKnowledge, Method, Observations};
 use crate::geometry::arm::JointValues;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -112,11 +112,11 @@ impl RoughAnswer {
         let observations = known.observations;
         let target = observations.target;
         let fixed = Observations { camera: CameraKnowledge::Fixed(lens(observations)), ..observations.clone() };
-        let calibration = calibrate(&fixed, Method::Joint, cancel).ok()?;
-        let model = ViewModel::new(&calibration, &target)?;
+        let fit = estimate::fit(&fixed, Method::Joint, cancel).ok()?;
+        let model = ViewModel::new(&fit, &target)?;
         let noise = at_least(model.noise(), &CAREFUL_NOISE);
         let model = model.with_noise(noise);
-        let views = expected_views(&model, &used_views(&fixed, Some(&calibration)));
+        let views = expected_views(&model, &used_views(&fixed, Some(&fit)));
         let design = Design::new(model.prior(), &views, Matrix6::identity())?;
         let robot = known.robot.map(|robot| {
             let mut around = with_board(robot, model.hand_eye(), observations, CAREFUL_ROOM_M);

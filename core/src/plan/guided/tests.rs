@@ -337,8 +337,7 @@ fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error
         let mut ending = None;
         for count in 11..=all.len() {
             cell.observations.views = all[..count].to_vec();
-            let mut calibration = cell.calibrate().expect("twelve good views");
-            calibration.claim = claim.clone();
+            let calibration = cell.calibrate().expect("twelve good views").claiming(claim.clone());
             if let Next::End(end) = guide.next(&cell.known(Some(&calibration), 0.0), &CancelToken::default()) {
                 let is_first = count == 11;
                 assert!(!is_first || !end.is_success(), "one small error may be luck");
@@ -360,8 +359,7 @@ fn below_the_goal_it_says_why_it_goes_on() {
     let all = cell.observations.views.clone();
     let mut hold = |views: usize, goal_m: f64, claim: Claim| {
         cell.observations.views = all[..views].to_vec();
-        let mut calibration = cell.calibrate().expect("good views");
-        calibration.claim = claim;
+        let calibration = cell.calibrate().expect("good views").claiming(claim);
         let mut guide = Guide::new(options(goal_m));
         let _next = guide.next(&cell.known(Some(&calibration), 0.0), &CancelToken::default());
         (guide.hold(), calibration.tip_error_95_m().expect("stated"), error_at_upper_levels(&calibration, None))
@@ -509,7 +507,7 @@ fn it_does_not_end_before_errors_that_depend_on_the_place_are_looked_for() {
         let mut cell = GuidedCell::new(CellSetup { noise, ..CellSetup::new(CellArm::Ur5e, mode, 3) });
         let run = cell.run(options(8e-3));
         assert!(matches!(run.ending, Ending::GoalReached { .. }), "{:?}", run.ending);
-        let joint = run.calibration.and_then(|it| it.joint).expect("it was solved");
+        let joint = run.calibration.and_then(|it| it.joint.clone()).expect("it was solved");
         assert!(joint.field.is_some(), "{mode:?}: {} views", run.history.last().expect("some").0);
     }
 }

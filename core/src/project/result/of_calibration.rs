@@ -9,10 +9,11 @@ use super::{
     MethodRecord, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate,
     TargetSizeEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
 };
+use crate::diagnose::Calibration;
 use crate::estimate::handeye::joint::{PrintErrors, RobotField, ShownDistortion};
 use crate::estimate::uncertainty::widening::Evidence;
 use crate::estimate::{
-    Calibration, CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
+    CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
 };
 use crate::targets::TargetSpec;
 

@@ -14,7 +14,7 @@ use super::expected_pixels::ExpectedPixels;
 use super::field::{HALF, RobotField, SLOPES};
 use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
 use super::{Free, Noise};
-use crate::estimate::Calibration;
+use crate::estimate::Fit;
 use crate::estimate::handeye::{HandEye, Mode};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -50,7 +50,7 @@ pub struct ExpectedView {
 
 impl ViewModel {
     /// That of a joint estimate with a robot and a camera; `None` for any other calibration.
-    pub fn new(calibration: &Calibration, target: &TargetSpec) -> Option<Self> {
+    pub fn new(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let joint = calibration.joint.as_ref()?;
         let intrinsics = calibration.intrinsics()?;
         let free = Free { joints: false, depth: false, ..joint.free };

@@ -2,7 +2,7 @@ use super::*;
 use crate::estimate::handeye::joint::normal::System;
 use crate::estimate::handeye::joint::state::State;
 use crate::estimate::handeye::joint::{JointProblem, estimate};
-use crate::estimate::{Method, calibrate};
+use crate::estimate::{Method, fit};
 use crate::progress::CancelToken;
 use crate::testing::sessions::{BOARD, REALISTIC, add_field, camera, trial};
 
@@ -21,7 +21,7 @@ fn what_views_are_expected_to_say_is_what_the_estimator_takes_from_them() {
             add_field(&mut rand_of(7), &noise, &mut trial.views);
         }
         let observations = trial.observations(lens_free);
-        let calibration = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("a good session");
+        let calibration = fit(&observations, Method::Joint, &CancelToken::default()).expect("a good session");
         let model = ViewModel::new(&calibration, &BOARD).expect("a joint estimate");
         assert_eq!(model.field.is_some(), field, "the data show the field");
 
@@ -63,7 +63,7 @@ fn the_information_of_all_views_gives_the_covariance_of_the_estimate() {
     let problem = JointProblem { noise: Some(REALISTIC), ..JointProblem::new(trial.mode, &trial.board, &trial.views) };
     let solution = estimate(&problem, &trial.start(), &CancelToken::default()).expect("a good session");
     let observations = trial.observations(false);
-    let calibration = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("a good session");
+    let calibration = fit(&observations, Method::Joint, &CancelToken::default()).expect("a good session");
     let model = ViewModel::new(&calibration, &BOARD).expect("a joint estimate").with_noise(REALISTIC);
     let all: Vec<usize> = (0..BOARD.len()).collect();
     let information: DMatrix<f64> = trial

@@ -187,7 +187,7 @@ impl HandGuide {
         let model = ViewModel::new(known.calibration?, &known.observations.target)?;
         let noise = at_least(model.noise(), &LEAST_NOISE);
         let model = model.with_noise(noise);
-        let used = used_views(known.observations, known.calibration);
+        let used = used_views(known.observations, known.fit());
         let design = self.guide.ground(known, &model, &used, cancel)?.design;
         Some(Worth { model, design, ratio })
     }

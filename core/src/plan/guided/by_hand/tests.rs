@@ -39,7 +39,7 @@ fn first_views_are_asked_for_by_how_they_look_and_what_is_skipped_does_not_come_
     let truth = cell.truth();
     let first = truth.camera_from_target(&at);
     let mut guide = HandGuide::new(options());
-    let next = |guide: &mut HandGuide, calibration: Option<&crate::estimate::Calibration>| match guide.next(
+    let next = |guide: &mut HandGuide, calibration: Option<&crate::diagnose::Calibration>| match guide.next(
         &cell.known(calibration, 0.0),
         &first,
         truth.intrinsics(),
