@@ -22,7 +22,9 @@ use handeye_core::testing::sessions::{GRID, camera};
 use handeye_core::wording::Catalogue;
 
 use handeye_core::targets::TargetSpec;
-use nalgebra::{SMatrix, Vector2, Vector6};
+use handeye_core::targets::corner_covariance::CornerCovariance;
+use handeye_core::targets::observation::Corners;
+use nalgebra::{DMatrix, SMatrix, Vector2, Vector6};
 
 #[test]
 fn every_degenerate_or_hostile_session_gets_its_code_and_none_is_called_healthy() {
@@ -491,4 +493,34 @@ mod slow {
             }
         }
     }
+}
+
+/// As where edges are hard and a board lies along the pixels: all of it is off, which no residual shows.
+#[test]
+fn a_view_whose_corners_are_off_together_as_their_detector_says_contradicts_nothing() {
+    let observations = session(&Setup::new(Mode::EyeInHand, 16, 720));
+    let accused = |stated: bool| {
+        let mut observations = observations.clone();
+        for (i, view) in observations.views.iter_mut().enumerate() {
+            let mut corners = view.corners.as_ref().expect("seen").to_vec();
+            let shared_px2 = if i == 3 { 1.0 } else { 0.0 };
+            for corner in corners.iter_mut().filter(|_| i == 3) {
+                corner.px.x += 2.0;
+            }
+            let covariance = DMatrix::from_fn(2 * corners.len(), 2 * corners.len(), |a, b| {
+                let own = if a == b { 0.01 } else { 0.0 };
+                own + if a % 2 == 0 && b % 2 == 0 { shared_px2 } else { 0.0 }
+            });
+            for (k, corner) in corners.iter_mut().enumerate().filter(|_| stated) {
+                corner.covariance_px2 = Some(covariance.fixed_view::<2, 2>(2 * k, 2 * k).into_owned());
+            }
+            let together = CornerCovariance::new(&covariance).filter(|_| stated);
+            view.corners = Some(Corners::together(corners, together));
+        }
+        let diagnosis = diagnose(&observations, &FindingOptions::default(), &CancelToken::default());
+        diagnosis.findings.into_iter().filter(|finding| finding.severity >= Severity::Warning).collect::<Vec<_>>()
+    };
+    let alike = accused(false);
+    assert!(alike.iter().any(|finding| finding.code == FindingCode::OutlierView), "{alike:?}");
+    assert!(accused(true).is_empty(), "{:?}", accused(true));
 }
