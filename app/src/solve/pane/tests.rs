@@ -108,7 +108,7 @@ fn the_camera_in_the_tip_is_in_millimetres_with_its_uncertainty() {
 #[test]
 fn with_something_found_no_uncertainty_is_stated_for_an_axis_and_the_reason_is_not_the_method() {
     let pane = driven(sample::with_answer(|solved| {
-        solved.calibration = solved.calibration.clone().claiming(Claim::Moved(Vec::new()))
+        solved.calibration = solved.calibration.clone().claiming(Claim::Moved(Vec::new()));
     }));
     assert!(pane.sees("With what was found below no ± can be stated for each axis."));
     assert!(!pane.sees("A closed form states no uncertainty.") && !pane.sees("± 95 % [mm]"));
