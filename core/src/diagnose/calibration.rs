@@ -2,21 +2,25 @@
 //!
 //! A least-squares fit states the error that its own model has. Whether the data agree with that model it does not know, so a
 //! [`Fit`] states no error; looking for what contradicts it does, and yields the [`Calibration`] that states one. There is no
-//! other way to one.
+//! other way to one (the feature `testing` has made-up ones).
 //!
 //! ```
 //! use handeye_core::diagnose::Calibration;
+//! use handeye_core::estimate::Fit;
 //!
 //! fn print(calibration: &Calibration) {
-//!     println!("{:?} m", calibration.tip_error_95_m());
+//!     let fit: &Fit = calibration;
+//!     println!("residual {:?} px, error {:?} m", fit.rms_px, calibration.tip_error_95_m());
 //! }
 //! ```
+//!
+//! The fit has none:
 //!
 //! ```compile_fail
 //! use handeye_core::estimate::Fit;
 //!
 //! fn print(fit: &Fit) {
-//!     println!("{:?} m", fit.tip_error_95_m());
+//!     println!("residual {:?} px, error {:?} m", fit.rms_px, fit.tip_error_95_m());
 //! }
 //! ```
 

@@ -1,4 +1,4 @@
-//! From observations to a calibration: intrinsics, closed forms, the joint estimate, and what it is worth.
+//! From observations to a fit: intrinsics, closed forms, the joint estimate, and how well its own model knows it.
 //!
 //! One path for the window, the command line and the tests.
 
@@ -324,7 +324,7 @@ pub enum CalibrateError {
 /// Where the lens begins among the unknowns that [`JointFit::covariance`] is of: both links come first.
 const LENS_AT: usize = 12;
 
-/// A finished calibration.
+/// What a fit gives. It states no error: [`Calibration`](crate::diagnose::Calibration) does, once the fit is examined.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Fit {
@@ -596,7 +596,8 @@ pub enum ViewStatus {
     NoTarget,
 }
 
-/// Calibrates from observations.
+/// Fits hand-eye and camera to observations. Whether the data agree with the model is not looked at:
+/// [`diagnose::calibrate`](crate::diagnose::calibrate) does that as well.
 ///
 /// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too.
 ///
