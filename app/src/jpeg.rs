@@ -25,7 +25,7 @@ pub fn encoded(
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::image::{ImageFormat, load_from_memory_with_format};
+    use image::{ImageFormat, load_from_memory_with_format};
 
     use super::*;
 

@@ -36,5 +36,4 @@ pub mod truth;
 pub mod verify;
 pub mod worker;
 
-pub use handeye_core::text;
-use handeye_core::wording;
+pub use handeye_wording::text;

@@ -1,8 +1,8 @@
 //! How fast the arm moves when nobody says otherwise.
 
-use handeye_core::geometry::arm::JointKind;
-use handeye_core::plan::Pace;
-use handeye_core::project::taught_poses;
+use handeye_arm::JointKind;
+use handeye_dataset::taught_poses;
+use handeye_plan::Pace;
 use handeye_sim_link::client::MotionLimits;
 
 /// Limits of the reference sequence: of every motion in the window, and of pose files without their own.

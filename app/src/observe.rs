@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use handeye_core::detect::{self, DetectOptions, VisionError};
-use handeye_core::estimate::Observations;
-use handeye_core::image::GrayImage;
-use handeye_core::progress::CancelToken;
-use handeye_core::project::dataset::{Dataset, DatasetError};
-use handeye_core::project::files::image_file::{self, gray_from_rgb};
-use handeye_core::project::session::{CaptureId, CaptureRecord, Session, SessionError, SessionObservations};
-use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::{Corner, Corners, Sight};
-use handeye_core::targets::{AprilTag, Grid, TargetSpec};
+use handeye_dataset::{Dataset, DatasetError};
+use handeye_detect::{self as detect, DetectOptions, VisionError};
+use handeye_estimate::Observations;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::depth_plane::DepthPlane;
+use handeye_geometry::targets::observation::{Corner, Corners, Sight};
+use handeye_geometry::targets::{AprilTag, Grid, TargetSpec};
+use handeye_images::gray_from_rgb;
+use handeye_session::{CaptureId, CaptureRecord, Session, SessionError, SessionObservations};
+use image::GrayImage;
 use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
-#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum ObserveError {
     /// An image of a data set could not be read.
@@ -144,7 +144,7 @@ pub fn observe_images(
 ) -> Result<Vec<Option<Corners>>, ObserveError> {
     let names: Vec<String> = images.iter().map(|image| image.display().to_string()).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    corners_of(&names, |index| Ok(image_file::load_gray(&images[index]).ok()), target, progress, cancel)
+    corners_of(&names, |index| Ok(handeye_images::load_gray(&images[index]).ok()), target, progress, cancel)
 }
 
 /// The chessboards that images show, by their sides in inner corners, with how many images show each.
@@ -159,7 +159,7 @@ pub fn chessboards_in_sight(
     // What is looked for says only how small squares may be.
     const USUAL: Grid = Grid { columns: 9, rows: 6, square_m: 0.02 };
     let look = |index: usize| {
-        let Ok(image) = image_file::load_gray(&images[index]) else { return Ok(None) };
+        let Ok(image) = handeye_images::load_gray(&images[index]) else { return Ok(None) };
         let name = images[index].display().to_string();
         detect::chessboard_in_sight(&image, &USUAL, cancel).map_err(|source| match source {
             VisionError::Cancelled => ObserveError::Cancelled,
@@ -184,7 +184,7 @@ pub fn tags_in_sight(
     cancel: &CancelToken,
 ) -> Result<BTreeMap<usize, usize>, ObserveError> {
     let look = |index: usize| {
-        let Ok(image) = image_file::load_gray(&images[index]) else { return Ok(Vec::new()) };
+        let Ok(image) = handeye_images::load_gray(&images[index]) else { return Ok(Vec::new()) };
         let failed = |source| ObserveError::Vision { name: images[index].display().to_string(), source };
         detect::tags_in_sight(&image, tag).map_err(failed)
     };

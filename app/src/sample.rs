@@ -42,8 +42,8 @@ pub fn write(folder: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::project::dataset::Dataset;
-    use handeye_core::project::files::bounds::Bounds;
+    use handeye_dataset::Dataset;
+    use handeye_files::bounds::Bounds;
 
     use super::*;
 

@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use directories::BaseDirs;
-use handeye_core::depth::ColourMap;
+use handeye_geometry::depth::ColourMap;
 use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
@@ -287,7 +287,7 @@ impl SettingsWrite {
             if let Some(folder) = self.path.parent() {
                 std::fs::create_dir_all(folder)?;
             }
-            handeye_core::project::files::atomic_file::write(&self.path, self.content.as_bytes())
+            handeye_files::atomic_file::write(&self.path, self.content.as_bytes())
         };
         write().map_err(|error: io::Error| {
             Warning(text!(

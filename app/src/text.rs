@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
-pub use handeye_core::wording::{Catalogue, Text};
+pub use handeye_wording::{Catalogue, Text};
 
 /// Languages of the window.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

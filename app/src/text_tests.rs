@@ -56,9 +56,10 @@ fn literal(source: &str) -> Option<String> {
 
 fn all_sources() -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
-    for folder in ["src", "../core/src", "../sim_link/src"] {
+    for folder in ["src", "../core", "../sim_link"] {
         sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
     }
+    files.retain(|file| file.components().any(|part| part.as_os_str() == "src"));
     let read = |file: PathBuf| std::fs::read_to_string(&file).map(|source| (file, source)).expect("a source");
     files.into_iter().map(read).collect()
 }
@@ -84,7 +85,7 @@ fn has_words(text: &str) -> bool {
 /// The messages of errors that reach the window, with the places where they stand.
 fn errors() -> BTreeMap<String, PathBuf> {
     let mut errors = BTreeMap::new();
-    for (file, source) in all_sources().into_iter().filter(|(_, source)| source.contains("wording::Said)]")) {
+    for (file, source) in all_sources().into_iter().filter(|(_, source)| source.contains("Said)]")) {
         for (at, attribute) in source.match_indices("#[error(") {
             let message = source[at + attribute.len()..].trim_start();
             if message.starts_with('"')
@@ -115,7 +116,7 @@ fn what_an_error_misses_or_wants_is_there_in_chinese() {
     let mut missing = Vec::new();
     for (file, source) in all_sources() {
         let path = file.to_string_lossy().replace('\\', "/");
-        let is_said = ["/core/src/", "/sim_link/src/client/"].iter().any(|folder| path.contains(folder));
+        let is_said = ["/core/", "/sim_link/src/client/"].iter().any(|folder| path.contains(folder));
         if !is_said || path.contains("tests") {
             continue;
         }
@@ -191,9 +192,9 @@ fn no_error_of_ours_is_passed_on_in_english() {
 
 #[test]
 fn an_error_within_errors_is_said_in_chinese_to_its_end() {
-    use handeye_core::estimate::CalibrateError;
-    use handeye_core::estimate::intrinsics::IntrinsicsError;
-    use handeye_core::geometry::camera::CameraError;
+    use handeye_estimate::CalibrateError;
+    use handeye_estimate::intrinsics::IntrinsicsError;
+    use handeye_geometry::camera::CameraError;
     use handeye_sim_link::driver::{DriverError, Ending};
 
     let source = CameraError::BehindCamera { z_m: -1.0 };

@@ -1,9 +1,9 @@
 //! A result beside the truth that a simulated cell publishes. Reports only: nothing here reaches a solver.
 
-use handeye_core::estimate::handeye::HandEye;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Camera, Pose, Tip};
-use handeye_core::project::result::{CalibrationResult, TruthComparison};
+use handeye_estimate::handeye::HandEye;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Camera, Pose, Tip};
+use handeye_result::{CalibrationResult, TruthComparison};
 
 /// Errors of an eye-in-hand result; `None` for a result of another kind.
 pub fn comparison(

@@ -21,8 +21,8 @@ use handeye_app::model::{
     Axis, CapturePurpose, CellSource, Drivers, Jog, JogFrame, JogSettings, JogStep, Model, Motion, SolveStatus,
 };
 use handeye_app::rerun_log::RerunChoice;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};

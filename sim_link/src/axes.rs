@@ -1,7 +1,7 @@
 //! The one place that knows how the axes of a CoppeliaSim vision sensor lie in a camera, and those of its board on the sheet.
 
-use handeye_core::geometry::frames::{Camera, Pose, Sensor};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::frames::{Camera, Pose, Sensor};
+use handeye_geometry::targets::TargetSpec;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// The camera (x right, y down, z forward) in the axes of a vision sensor (x left, y up, z forward): diag(−1, −1, 1), half

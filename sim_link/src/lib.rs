@@ -9,5 +9,3 @@ pub mod drivers;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod wire;
-
-use handeye_core::wording;

@@ -7,17 +7,17 @@
 
 use std::path::Path;
 
-use handeye_core::detect::detect;
-use handeye_core::diagnose::calibrate;
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{CameraKnowledge, Method, Observations, ObservedView};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::image::{DynamicImage, GrayImage};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
-use handeye_core::targets::observation::Corner;
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_detect::detect;
+use handeye_estimate::diagnose::calibrate;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::observation::Corner;
 use handeye_sim_link::cell::render::{RenderScene, Renderer, Sampling};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
+use image::{DynamicImage, GrayImage};
 use nalgebra::Isometry3;
 
 type Failure = Box<dyn std::error::Error>;
@@ -64,7 +64,7 @@ type Taught = (String, Pose<Base, Tip>);
 fn taught() -> Result<Vec<Taught>, Failure> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/poses/seed10.toml");
     let poses = TaughtPoses::parse(&file, &std::fs::read_to_string(&file)?)?.poses;
-    let tip = |pose: &handeye_core::project::taught_poses::TaughtPose| match &pose.goal {
+    let tip = |pose: &handeye_dataset::taught_poses::TaughtPose| match &pose.goal {
         Goal::Tip(tip) => Ok((pose.name.clone(), *tip)),
         Goal::Joints(_) => Err("the taught poses are poses of the tip"),
     };

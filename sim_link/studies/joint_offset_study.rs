@@ -3,7 +3,7 @@
 #[path = "support/information.rs"]
 mod information;
 
-use handeye_core::plan::ViewOptions;
+use handeye_plan::ViewOptions;
 use handeye_sim_link::cell::recorded::{SessionOptions, record};
 use handeye_sim_link::cell::scene::Scene;
 use information::{Information, JOINTS, Noise, POSES, SCALE, UNKNOWNS};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use handeye_core::testing::{Need, programs};
+use handeye_geometry::testing::{Need, programs};
 
 use crate::browser::{Browser, Tab};
 use crate::process;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use handeye_core::project::files::bounds::Bounds;
+use handeye_files::bounds::Bounds;
 use handeye_sim_link::client::cell::CellPaths;
 
 use crate::command::{Command, Event, Outbox};

@@ -1,6 +1,6 @@
 //! What moves the arm, and what has to be asked first.
 
-use handeye_core::project::taught_poses::{Goal, TaughtPose};
+use handeye_dataset::taught_poses::{Goal, TaughtPose};
 use handeye_sim_link::cell::scene::{SceneChoice, ShippedScene};
 
 use super::tests::{bench, said};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::project::files::bounds::Bounds;
+use handeye_files::bounds::Bounds;
 
 use crate::command::Command;
 use crate::model::{CellSource, Drivers};

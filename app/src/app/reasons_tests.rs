@@ -7,7 +7,7 @@ use crate::guided::state::Waits;
 use crate::model::{CapturePurpose, CaptureRefused, MotionOutcome, Pane, PoseSequence, RefusalKind};
 use crate::text::{Language, Text};
 use crate::worker::fake::FakeCell;
-use handeye_core::plan::guided::Ending;
+use handeye_plan::guided::Ending;
 
 const MANUAL: &str = "The robot refuses: the pendant is in manual mode";
 

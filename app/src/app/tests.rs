@@ -1,14 +1,14 @@
 use std::time::{Duration, Instant};
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::plan::guided::by_hand::{HandGuide, HandNext, Wanted};
-use handeye_core::plan::guided::choose::{Plan, Proposal};
-use handeye_core::plan::guided::{Ending, GuidedOptions, Known, Next, Why};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::session::{CaptureId, Role};
-use handeye_core::targets::observation::Corner;
+use handeye_arm::JointValues;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::frames::Pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::observation::Corner;
+use handeye_plan::guided::by_hand::{HandGuide, HandNext, Wanted};
+use handeye_plan::guided::choose::{Plan, Proposal};
+use handeye_plan::guided::{Ending, GuidedOptions, Known, Next, Why};
+use handeye_session::{CaptureId, Role};
 
 use super::*;
 use crate::by_hand::state::HandWaits;

@@ -2,8 +2,8 @@
 //! what to change in words.
 
 use egui::{Align2, Color32, Painter, Pos2, Shape, Stroke};
-use handeye_core::geometry::frames::{Camera, Pose, Target};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_geometry::targets::TargetSpec;
 
 use super::pane::to_do;
 use super::state::HandWaits;

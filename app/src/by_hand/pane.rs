@@ -1,7 +1,7 @@
 //! What a person who is guided has to do, in the pane of the poses.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
-use handeye_core::plan::guided::CHECKS;
+use handeye_plan::guided::CHECKS;
 
 use super::state::{ByHand, HandWaits};
 use crate::command::{Command, Outbox};

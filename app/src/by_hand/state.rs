@@ -1,8 +1,8 @@
 //! A calibration that a person is guided through.
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::guided::by_hand::{HandGuide, HandNext, Judged, Wanted};
-use handeye_core::plan::guided::{Ending, GuidedOptions};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_plan::guided::by_hand::{HandGuide, HandNext, Judged, Wanted};
+use handeye_plan::guided::{Ending, GuidedOptions};
 
 /// Where it is.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,5 @@
-use handeye_core::plan::guided::GuidedOptions;
-use handeye_core::plan::guided::by_hand::{Deviation, Judged};
+use handeye_plan::guided::GuidedOptions;
+use handeye_plan::guided::by_hand::{Deviation, Judged};
 use nalgebra::Vector2;
 
 use super::pane::{begin_ui, progress_ui};

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use handeye_core::estimate::Method;
-use handeye_core::plan::guided::by_hand::HandNext;
-use handeye_core::plan::guided::{CHECKS, Ending};
-use handeye_core::project::session::Role;
+use handeye_estimate::Method;
+use handeye_plan::guided::by_hand::HandNext;
+use handeye_plan::guided::{CHECKS, Ending};
+use handeye_session::Role;
 
 use super::state::{ByHand, HandChoice, HandWaits};
 use super::worker::HandJob;

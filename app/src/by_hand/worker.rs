@@ -3,12 +3,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_core::estimate::Observations;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::planar_pose;
-use handeye_core::plan::guided::Known;
-use handeye_core::plan::guided::by_hand::{HandGuide, HandNext};
-use handeye_core::progress::CancelToken;
+use handeye_estimate::Observations;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::planar_pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_plan::guided::Known;
+use handeye_plan::guided::by_hand::{HandGuide, HandNext};
 
 use super::state::HandChoice;
 use crate::command::Event;

@@ -1,7 +1,7 @@
 //! Images of a board that tests draw.
 
-use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_geometry::targets::{Grid, TargetSpec};
+use image::{Rgb, RgbImage};
 
 /// What is drawn.
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });

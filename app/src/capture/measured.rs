@@ -3,14 +3,14 @@
 use std::fmt;
 use std::sync::Arc;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::image::{RgbImage, imageops};
-use handeye_core::project::session::{Capture, CaptureId, Role, SessionError, Store};
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::Corners;
+use handeye_arm::JointValues;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::depth_plane::DepthPlane;
+use handeye_geometry::targets::observation::Corners;
+use handeye_session::{Capture, CaptureId, Role, SessionError, Store};
+use image::{RgbImage, imageops};
 
 use crate::model::CapturePurpose;
 
@@ -40,7 +40,7 @@ pub struct Measured {
     pub frames: u32,
     /// Simulated time \[s\] until robot and image had come to rest.
     pub settled_s: f64,
-    /// Standard deviation of a corner in *one* of the images \[px\], see [`handeye_core::capture::Scatter::sigma_px`];
+    /// Standard deviation of a corner in *one* of the images \[px\], see [`handeye_capture::Scatter::sigma_px`];
     /// `None` below three images in which the quick search found the board.
     pub corner_noise_px: Option<f64>,
     /// The board's points in the mean image.

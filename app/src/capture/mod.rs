@@ -8,7 +8,7 @@
 //! | [`Measured`] | a capture that is good, to be recorded in a session |
 //! | [`refusal`] | why there is none, in words |
 //!
-//! What is decided on the way (at rest, sharp, too similar) is decided in [`handeye_core::capture`].
+//! What is decided on the way (at rest, sharp, too similar) is decided in [`handeye_capture`].
 
 mod measured;
 pub(crate) mod pane;

@@ -1,8 +1,10 @@
 //! Why there is no capture: what is wrong and what to do, in words.
 
-use handeye_core::capture::{EdgeBlur, NO_IMAGES_S, Refusal, RobotRate};
-use handeye_core::detect::VisionError;
-use handeye_core::targets::TargetSpec;
+use handeye_capture::{NO_IMAGES_S, Refusal, RobotRate};
+
+use handeye_detect::EdgeBlur;
+use handeye_detect::VisionError;
+use handeye_geometry::targets::TargetSpec;
 
 use crate::model::RefusalKind;
 use crate::text;

@@ -1,7 +1,7 @@
 //! What is asked for.
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::session::Document;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_session::Document;
 
 use crate::model::{CaptureOptions, CapturePurpose};
 

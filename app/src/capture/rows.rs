@@ -4,10 +4,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::{Context, Id};
-use handeye_core::diagnose::coverage::{Coverage, CoveredView};
-use handeye_core::diagnose::findings::{Finding, FindingCode};
-use handeye_core::estimate::{CornerResidual, ViewResult, ViewStatus};
-use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
+use handeye_estimate::diagnose::coverage::{Coverage, CoveredView};
+use handeye_estimate::diagnose::findings::{Finding, FindingCode};
+use handeye_estimate::{CornerResidual, ViewResult, ViewStatus};
+use handeye_session::{CaptureId, CaptureRecord, Document, Role};
 
 use crate::model::{Model, Observed, Solved};
 use crate::scene::{self, Standing};

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use handeye_core::capture::{self, Machine, Plan, Progress, Refusal, Shot, Sighting, Taken, Wait};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::image::GrayImage;
-use handeye_core::progress::CancelToken;
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::{Corner, Corners};
+use handeye_capture::{self as capture, Machine, Plan, Progress, Refusal, Shot, Taken, Wait};
+
+use handeye_detect::{self as detect, Sighting};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::depth_plane::DepthPlane;
+use handeye_geometry::targets::observation::{Corner, Corners};
+use image::GrayImage;
 
 use super::refusal::{self, Why};
 use super::{CaptureRequest, Measured, thumbnail};
@@ -102,7 +104,7 @@ impl Sequence {
     /// before all images are there.
     pub fn measure(&self, cancel: &CancelToken) -> Option<Result<Measured, Why>> {
         let (taken, last) = (self.machine.finish()?, self.last.as_ref()?);
-        Some(match capture::observe_image(&taken.rgb, &self.target, cancel) {
+        Some(match detect::observe_image(&taken.rgb, &self.target, cancel) {
             Err(error) => Err(refusal::not_searched(&error)),
             Ok(None) => Err(refusal::no_board(&self.target)),
             Ok(Some(Sighting { blur: Some(blur), .. })) if blur.is_too_blurred() => Err(refusal::blurred(&blur)),

@@ -1,9 +1,9 @@
 //! The newest sight of the board, and the capture that is under way.
 
-use handeye_core::capture::Wait;
-use handeye_core::detect::VisionError;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::targets::observation::Corners;
+use handeye_capture::Wait;
+use handeye_detect::VisionError;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::observation::Corners;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

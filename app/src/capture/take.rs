@@ -1,9 +1,9 @@
 //! A capture from the request to its end, for a thread that can wait.
 
-use handeye_core::detect::{DetectOptions, detect_with};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::files::image_file::gray_from_rgb;
-use handeye_core::targets::TargetSpec;
+use handeye_detect::{DetectOptions, detect_with};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use handeye_images::gray_from_rgb;
 
 use super::{CaptureRequest, Measured, Sequence};
 use crate::model::{CaptureRefused, LiveFrame};
@@ -33,7 +33,7 @@ pub enum CaptureEnd {
     Refused(CaptureRefused),
 }
 
-/// Takes a capture. Ends, whatever the images are: see [`handeye_core::capture::Machine`].
+/// Takes a capture. Ends, whatever the images are: see [`handeye_capture::Machine`].
 ///
 /// # Errors
 /// Those of the images.

@@ -3,11 +3,11 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::progress::CancelToken;
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::Pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use image::{Rgb, RgbImage};
 
 use super::drawn::{BOARD, board, brighter_board};
 use super::{CaptureEnd, CaptureRequest, Images, take};

@@ -1,7 +1,7 @@
 //! Captures.
 
-use handeye_core::capture::Wait;
-use handeye_core::project::session::CaptureId;
+use handeye_capture::Wait;
+use handeye_session::CaptureId;
 
 use crate::app::App;
 use crate::capture::CaptureRequest;

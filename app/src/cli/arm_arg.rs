@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use handeye_core::geometry::arm::urdf::Urdf;
-use handeye_core::geometry::arm::{Arm, ArmKind, JointRange, JointValues, JointView, place};
-use handeye_core::geometry::frames::Pose;
+use handeye_arm::urdf::Urdf;
+use handeye_arm::{Arm, ArmKind, JointRange, JointValues};
+use handeye_estimate::placement::{JointView, place};
+use handeye_geometry::frames::Pose;
 use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::Failure;
@@ -92,7 +93,7 @@ fn both(a: &JointRange, b: &JointRange) -> JointRange {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use handeye_core::nalgebra::Isometry3;
+    use nalgebra::Isometry3;
 
     const HERE: [f64; 6] = [0.3, -1.2, 1.4, -1.7, -1.5, 0.2];
 

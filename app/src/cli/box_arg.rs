@@ -1,7 +1,7 @@
 //! `--box`: where the tool works.
 
-use handeye_core::estimate::uncertainty::quality::TipBox;
-use handeye_core::nalgebra::{Point3, Vector3};
+use handeye_estimate::uncertainty::quality::TipBox;
+use nalgebra::{Point3, Vector3};
 
 /// Longer \[m\] is taken for millimetres.
 const FARTHEST_M: f64 = 10.0;

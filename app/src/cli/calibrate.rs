@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::estimate::{Method, Options};
+use handeye_estimate::{Method, Options};
 
 use super::gate::{self, Gate};
 use super::output::Output;

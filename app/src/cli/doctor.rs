@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::diagnose::calibrate_with;
-use handeye_core::diagnose::doctor::{Detail, diagnose};
-use handeye_core::diagnose::findings::FindingOptions;
-use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{CalibrateError, Method, Options};
+use handeye_estimate::diagnose::calibrate_with;
+use handeye_estimate::diagnose::doctor::{Detail, diagnose};
+use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::handeye::HandEyeError;
+use handeye_estimate::{CalibrateError, Method, Options};
 
 use super::output::Output;
 use super::{Failure, heading, out, solve};

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_core::project::dataset::{self, Dataset};
-use handeye_core::project::export::{self, CameraLink, ExportError, ExportInput, ExportNames, ExportView, Format};
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::Session;
+use handeye_dataset::{self as dataset, Dataset};
+use handeye_export::{CameraLink, ExportError, ExportInput, ExportNames, ExportView, Format};
+use handeye_result::CalibrationResult;
+use handeye_session::{CaptureRecord, Session};
 
 use super::{Failure, heading, out, solve};
 
@@ -57,7 +57,7 @@ pub struct ExportArgs {
 }
 
 fn format_names() -> Vec<&'static str> {
-    export::formats().iter().map(|f| f.name()).collect()
+    handeye_export::formats().iter().map(|f| f.name()).collect()
 }
 
 fn camera_link(text: &str) -> Result<CameraLink, String> {
@@ -81,7 +81,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
     let formats = args
         .format
         .iter()
-        .map(|name| export::by_name(name))
+        .map(|name| handeye_export::by_name(name))
         .collect::<Result<Vec<_>, _>>()
         .map_err(Failure::unusable)?;
     let names = names(args);
@@ -89,7 +89,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Failure> {
     let views =
         if formats.iter().any(|format| needs_views(*format, &input)) { read_views(&args.path)? } else { vec![] };
     input.views = &views;
-    let written = export::write_all(&args.out, &formats, &input)
+    let written = handeye_export::write_all(&args.out, &formats, &input)
         .map_err(|error| if error.is_bad_input() { Failure::unusable(error) } else { Failure::failed(error) })?;
     for path in written {
         out::line(path.display())?;
@@ -117,7 +117,7 @@ fn names(args: &ExportArgs) -> ExportNames {
 
 /// Whether a format asks for poses of images. Most do not, and then no dataset is read.
 fn needs_views(format: &dyn Format, input: &ExportInput<'_>) -> bool {
-    matches!(export::preview(format, input), Err(ExportError::NeedsViews { .. }))
+    matches!(handeye_export::preview(format, input), Err(ExportError::NeedsViews { .. }))
 }
 
 /// Images with robot poses of the session or data set that a result lies in; empty where there is none.
@@ -125,7 +125,7 @@ fn read_views(path: &Path) -> Result<Vec<ExportView>, Failure> {
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(path) };
     if Session::is_session(folder) {
         let session = Session::open(folder).map_err(Failure::unusable)?;
-        return Ok(session.document.in_use().filter_map(ExportView::of_capture).collect());
+        return Ok(session.document.in_use().filter_map(CaptureRecord::export_view).collect());
     }
     if !folder.join(dataset::DESCRIPTION).is_file() {
         return Ok(Vec::new());

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use handeye_core::project::result::{CalibrationResult, Quality};
+use handeye_result::{CalibrationResult, Quality};
 
 /// A condition such as `tip_error_95_mm<0.5`.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +100,7 @@ impl FromStr for Gate {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::diagnose::record::FindingRecord;
+    use handeye_estimate::diagnose::record::FindingRecord;
 
     use super::*;
 

@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_core::budget::{Budget, Limits};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::files::bounds::Bounds;
-use handeye_core::project::import::{self, Hypothesis, ImportError, Judgement, Recording, Settings, Verdict, write};
-use handeye_core::targets::TargetSpec;
-use handeye_core::wording::{English, Text};
+use handeye_files::bounds::Bounds;
+use handeye_files::budget::{Budget, Limits};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use handeye_import::{self as import, Hypothesis, ImportError, Judgement, Recording, Settings, Verdict, write};
+use handeye_wording::{English, Text};
 use serde_json::json;
 
 use super::output::Output;
@@ -336,8 +336,8 @@ fn listed(recording: &Recording, judgement: &Judgement, most: usize) -> String {
             if differs("mode") && !different.is_empty() {
                 let (camera, target) = (fit.camera_at_m * 1e3, fit.target_at_m * 1e3);
                 let (carries_camera, carries_target) = match h.mode {
-                    handeye_core::estimate::handeye::Mode::EyeInHand => ("tip", "base"),
-                    handeye_core::estimate::handeye::Mode::EyeToHand => ("base", "tip"),
+                    handeye_estimate::handeye::Mode::EyeInHand => ("tip", "base"),
+                    handeye_estimate::handeye::Mode::EyeToHand => ("base", "tip"),
                 };
                 line(format!(
                     "       the camera {camera:.0} mm from the {carries_camera}, the target {target:.0} mm from the {carries_target}"

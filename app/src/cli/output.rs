@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use handeye_core::project::files::{atomic_file, own_folder};
+use handeye_files::{atomic_file, own_folder};
 
 use super::{Failure, out};
 

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::diagnose::calibrate;
-use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::uncertainty::quality::TipBox;
-use handeye_core::estimate::{CalibrateError, Method};
-use handeye_core::geometry::frames::{Frame, Pose};
-use handeye_core::plan::guided::choose::Proposal;
-use handeye_core::plan::guided::{Guide, GuidedOptions, Known, Next, Why};
+use handeye_estimate::diagnose::calibrate;
+use handeye_estimate::handeye::HandEyeError;
+use handeye_estimate::uncertainty::quality::TipBox;
+use handeye_estimate::{CalibrateError, Method};
+use handeye_geometry::frames::{Frame, Pose};
+use handeye_plan::guided::choose::Proposal;
+use handeye_plan::guided::{Guide, GuidedOptions, Known, Next, Why};
 use serde::Serialize;
 
 use super::output::Output;

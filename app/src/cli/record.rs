@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use handeye_core::image::RgbImage;
-use handeye_core::project::session::Store;
+use handeye_session::Store;
 use handeye_sim_link::client::LinkError;
 use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
+use image::RgbImage;
 
 use crate::model::{CellFacts, ColouredDepth, FrameImages, FrameInfo, LiveFrame};
 use crate::rerun_log::{Entry, Recorder};

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_core::progress::CancelToken;
+use handeye_geometry::progress::CancelToken;
 
 use super::{Failure, heading, out};
 use crate::model::ViewerState;

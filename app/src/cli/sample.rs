@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_core::project::import::{ImportError, write};
+use handeye_import::{ImportError, write};
 
 use super::{Failure, heading};
 use crate::sample;

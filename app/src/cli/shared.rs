@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use handeye_core::estimate::shared_lens::{NamedSession, SharedLensError, calibrate_sharing_lens};
-use handeye_core::estimate::{Method, Options};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::result::CalibrationResult;
+use handeye_estimate::shared_lens::{NamedSession, SharedLensError, calibrate_sharing_lens};
+use handeye_estimate::{Method, Options};
+use handeye_geometry::progress::CancelToken;
+use handeye_result::CalibrationResult;
 
 use super::output::Output;
 use super::solve::{self, Input, Solution};

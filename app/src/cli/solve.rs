@@ -4,19 +4,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::anyhow;
-use handeye_core::diagnose::doctor::diagnose;
-use handeye_core::diagnose::findings::{Finding, FindingCode, FindingOptions};
-use handeye_core::estimate::handeye::{HandEyeError, Mode};
-use handeye_core::estimate::{CalibrateError, Method, Observations, ObservedView, Options};
-use handeye_core::plan::guided::record::GuidedRecord;
-use handeye_core::progress::CancelToken;
-use handeye_core::project::dataset::template::{CHOICE, template};
-use handeye_core::project::dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
-use handeye_core::project::export::{self, ExportInput, ExportNames};
-use handeye_core::project::result::{CalibrationResult, ViewRecordStatus};
-use handeye_core::project::session::{
-    self, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations,
-};
+use handeye_dataset::template::{CHOICE, template};
+use handeye_dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
+use handeye_estimate::diagnose::doctor::diagnose;
+use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions};
+use handeye_estimate::handeye::{HandEyeError, Mode};
+use handeye_estimate::{CalibrateError, Method, Observations, ObservedView, Options};
+use handeye_export::{ExportInput, ExportNames};
+use handeye_geometry::progress::CancelToken;
+use handeye_result::guided_record::GuidedRecord;
+use handeye_result::{CalibrationResult, ViewRecordStatus};
+use handeye_session::{self as session, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations};
 
 use super::output::Output;
 use super::{Failure, out};
@@ -257,9 +255,12 @@ fn as_document(dataset: &Dataset) -> Document {
 pub fn write_exports(folder: &Path, result: &CalibrationResult) -> Result<Vec<PathBuf>, Failure> {
     let names = ExportNames::default();
     let input = ExportInput::new(result, &names);
-    let formats: Vec<_> =
-        export::formats().iter().copied().filter(|format| export::preview(*format, &input).is_ok()).collect();
-    let written = export::write_all(folder, &formats, &input).map_err(Failure::failed)?;
+    let formats: Vec<_> = handeye_export::formats()
+        .iter()
+        .copied()
+        .filter(|format| handeye_export::preview(*format, &input).is_ok())
+        .collect();
+    let written = handeye_export::write_all(folder, &formats, &input).map_err(Failure::failed)?;
     tracing::info!("wrote {} to {}", out::counted(written.len(), "file", "files"), folder.display());
     Ok(written)
 }

@@ -2,9 +2,9 @@
 
 use anyhow::anyhow;
 use clap::{Args, Parser, ValueEnum};
-use handeye_core::project::dataset::write::target_table;
-use handeye_core::targets::print::{Page, PrintError, Sheet, pdf};
-use handeye_core::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+use handeye_dataset::write::target_table;
+use handeye_geometry::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+use handeye_print::{Page, PrintError, Sheet, pdf};
 
 use super::output::Output;
 use super::{Failure, heading, out};

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::plan::Surroundings;
-use handeye_core::project::taught_poses::TaughtPoses;
+use handeye_arm::JointValues;
+use handeye_dataset::taught_poses::TaughtPoses;
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_plan::Surroundings;
 use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 
 use super::Failure;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
 use super::stop_line::StopLine;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use handeye_core::project::export::ExportNames;
+use handeye_export::ExportNames;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

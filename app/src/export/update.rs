@@ -1,6 +1,6 @@
 //! Exports.
 
-use handeye_core::project::export::ExportView;
+use handeye_session::CaptureRecord;
 
 use crate::app::App;
 use crate::model::{Pane, Severity, Written, exports_of};
@@ -15,7 +15,7 @@ impl App {
             .iter()
             .filter_map(|id| self.model.document().capture(*id))
             .filter(|capture| capture.is_in_use())
-            .filter_map(ExportView::of_capture)
+            .filter_map(CaptureRecord::export_view)
             .collect();
         let names = self.model.export.names.clone();
         Some(Box::new(ExportJob { result: solved.result.clone(), names, views }))

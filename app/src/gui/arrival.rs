@@ -1,7 +1,7 @@
 //! Shows what a sequence of captures has led to: when it has ended and its answer is there, the pane of the step that is
 //! reached comes to the front. Once, and only if nobody is busy elsewhere.
 
-use handeye_core::project::session::Role;
+use handeye_session::Role;
 
 use crate::model::{CapturePurpose, Model, PoseSequence, Step};
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use handeye_core::plan::Surroundings;
+use handeye_plan::Surroundings;
 use handeye_sim_link::client::cell::CellPaths;
 
 use super::shell::layout::Layout;

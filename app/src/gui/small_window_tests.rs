@@ -5,8 +5,8 @@ use egui::epaint::{ClippedShape, Shape, TextShape};
 use egui::{Vec2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::plan::guided::GuidedOptions;
-use handeye_core::plan::guided::by_hand::Judged;
+use handeye_plan::guided::GuidedOptions;
+use handeye_plan::guided::by_hand::Judged;
 
 use super::style::theme;
 use super::testing::{Silent, sample};

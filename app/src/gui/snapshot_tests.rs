@@ -10,7 +10,7 @@ use egui::{Vec2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::wgpu::WgpuTestRenderer;
 use egui_wgpu::{RenderState, RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew, wgpu};
-use handeye_core::testing::{Need, skip};
+use handeye_geometry::testing::{Need, skip};
 
 use super::testing::Silent;
 use super::testing::sample;
@@ -183,7 +183,7 @@ fn snapshot_of_tracking() {
 fn snapshot_of_the_cell_in_three_dimensions() {
     let mut model = sample::tracking();
     model.track = crate::model::TrackState::default();
-    model.selection = vec![handeye_core::project::session::CaptureId(4)];
+    model.selection = vec![handeye_session::CaptureId(4)];
     model.scene.distance_m = 1.4;
     model.scene.centre_m = [0.2, 0.0, 0.25];
     looks_like("scene_light_zh", LIGHT, CHINESE, State::new(model).with(&[Pane::Scene, Pane::Poses]));

@@ -1,9 +1,9 @@
 //! How far the calibration has come: what is done, what can be done now, and what stands in the way.
 
-use handeye_core::estimate::GOOD_VIEWS;
-use handeye_core::estimate::handeye::motion::MIN_VIEWS;
-use handeye_core::project::session::Role;
-use handeye_core::verify::Verification;
+use handeye_estimate::GOOD_VIEWS;
+use handeye_estimate::handeye::motion::MIN_VIEWS;
+use handeye_estimate::verify::Verification;
+use handeye_session::Role;
 
 use super::status::STALE_AFTER_S;
 use crate::gui::style::numbers;

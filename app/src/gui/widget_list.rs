@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use egui::{Context, FullOutput, RawInput};
-use handeye_core::project::files::atomic_file;
+use handeye_files::atomic_file;
 
 /// The variable that names the file.
 pub const VARIABLE: &str = "HANDEYE_WIDGETS";

@@ -2,8 +2,8 @@ use std::collections::BTreeSet;
 
 use egui::vec2;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::targets::TargetSpec;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::targets::TargetSpec;
 
 use super::*;
 use crate::command::Event;

@@ -1,7 +1,7 @@
 //! The button that begins, and what is under way.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
-use handeye_core::plan::guided::{CHECKS, Guide};
+use handeye_plan::guided::{CHECKS, Guide};
 
 use super::state::{GuidedProgress, Waits};
 use crate::command::{Command, Outbox};

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use handeye_core::estimate::Observations;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::guided::choose::{Proposal, Robot};
-use handeye_core::plan::guided::{CHECKS, Ending, Guide, GuidedOptions, Known, Next, Why};
-use handeye_core::progress::CancelToken;
+use handeye_arm::JointValues;
+use handeye_estimate::Observations;
+use handeye_geometry::progress::CancelToken;
+use handeye_plan::guided::choose::{Proposal, Robot};
+use handeye_plan::guided::{CHECKS, Ending, Guide, GuidedOptions, Known, Next, Why};
 
 use crate::model::{Severity, Solved};
 use crate::text;

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
-use handeye_core::plan::guided::{Ending, GuidedOptions, Why};
-use handeye_core::project::taught_poses::TaughtPose;
+use handeye_dataset::taught_poses::TaughtPose;
+use handeye_plan::guided::{Ending, GuidedOptions, Why};
 
 use super::pane::{begin_ui, progress_ui};
 use super::state::{GuidedProgress, Waits};

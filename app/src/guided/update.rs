@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use handeye_core::estimate::Method;
-use handeye_core::plan::guided::choose::Proposal;
-use handeye_core::plan::guided::{CHECKS, Ending, Next};
+use handeye_estimate::Method;
+use handeye_plan::guided::choose::Proposal;
+use handeye_plan::guided::{CHECKS, Ending, Next};
 
 use super::state::{Choice, ChoiceOutcome, ChosenStep, GuideRequest, GuidedProgress, Waits, ended, options};
 use crate::app::App;
@@ -13,6 +13,7 @@ use crate::motion::way::has_moved;
 use crate::session::archive::ArchiveTask;
 use crate::text;
 use crate::text::Text;
+use handeye_session::guided::guided_record;
 
 impl App {
     /// From the board in view to the goal. Captures that there are count; without any the first is taken here.
@@ -242,7 +243,7 @@ impl App {
     fn keep_guided(&mut self) {
         let guided = self.model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref());
         if let (Some(guided), Some(folder)) = (guided, self.model.session.folder.clone()) {
-            let task = ArchiveTask::Guided { folder, record: Box::new(guided.guide.record()) };
+            let task = ArchiveTask::Guided { folder, record: Box::new(guided_record(&guided.guide)) };
             if self.desk.archive(task).is_err() {
                 tracing::debug!("the record of guided capture is written later");
             }

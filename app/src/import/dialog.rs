@@ -9,9 +9,9 @@ use egui::{
     Align, Button, ColorImage, Id, Image, Layout, RichText, ScrollArea, TextEdit, TextureHandle, TextureOptions, Ui,
     Vec2, WidgetInfo, WidgetType,
 };
-use handeye_core::image::RgbImage;
-use handeye_core::project::import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
-use handeye_core::wording::Value;
+use handeye_import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
+use handeye_wording::Value;
+use image::RgbImage;
 
 use super::understand;
 use crate::command::{Command, Outbox};

@@ -3,11 +3,11 @@ use std::path::{Path, PathBuf};
 use egui::Ui;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::progress::CancelToken;
-use handeye_core::project::import::{
-    self, AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording, Role as TrackRole,
-    RotationForm, Sample, Settings, Sights, Stated,
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::progress::CancelToken;
+use handeye_import::{
+    self as import, AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording,
+    Role as TrackRole, RotationForm, Sample, Settings, Sights, Stated,
 };
 use nalgebra::{Isometry3, Vector3};
 
@@ -150,7 +150,7 @@ fn the_camera_alone_is_calibrated_once_the_target_is_named() {
     assert_eq!(pane.click("Calibrate the camera alone"), [Command::ConvertImages]);
 }
 
-fn without_meaning(given: Option<handeye_core::targets::TargetSpec>) -> Found {
+fn without_meaning(given: Option<handeye_geometry::targets::TargetSpec>) -> Found {
     Found { judgement: None, given, ..two() }
 }
 
@@ -221,7 +221,7 @@ fn a_recording_that_is_contradicted_or_not_read_says_why() {
 fn spoilt(folder: &Path) {
     const VIEWS: usize = 12;
     for (k, shade) in [10, 20, 30, 10].into_iter().enumerate() {
-        let image = RgbImage::from_pixel(8, 6, handeye_core::image::Rgb([shade; 3]));
+        let image = RgbImage::from_pixel(8, 6, image::Rgb([shade; 3]));
         image.save(folder.join(format!("image{k}.png"))).expect("written");
     }
     let base_from_tip = |k: usize| {

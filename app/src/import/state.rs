@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use handeye_core::image::RgbImage;
-use handeye_core::project::import::{Hypothesis, Judgement, Recording, Settings, Verdict};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::targets::TargetSpec;
+use handeye_import::{Hypothesis, Judgement, Recording, Settings, Verdict};
+use image::RgbImage;
 use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 

@@ -3,21 +3,21 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::estimate::CameraKnowledge;
-use handeye_core::progress::CancelToken;
-use handeye_core::project::import::{
-    self, Clocks, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights, Source,
-    Verdict, write,
+use handeye_estimate::CameraKnowledge;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::{AprilTag, TargetSpec};
+use handeye_import::{
+    self as import, Clocks, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights,
+    Source, Verdict, write,
 };
-use handeye_core::targets::{AprilTag, TargetSpec};
 
 use crate::observe::{self, ObserveError, Progress};
 use crate::text;
 use crate::text::Text;
-use crate::wording::Value;
+use handeye_wording::Value;
 
 /// Why nothing was made of a recording.
-#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Said)]
 pub enum NotUnderstood {
     /// The files, or the choices.
     #[error(transparent)]

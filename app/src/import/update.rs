@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use handeye_core::budget::Limits;
-use handeye_core::project::import::Settings;
-use handeye_core::targets::BadTarget;
+use handeye_files::budget::Limits;
+use handeye_geometry::targets::BadTarget;
+use handeye_import::Settings;
 
 use super::state::{Converted, Found, ImportState, ImportWork};
 use super::understand;
@@ -17,7 +17,7 @@ use crate::model::{Dialog, Severity};
 use crate::session::archive::ArchiveTask;
 use crate::text;
 use crate::text::Text;
-use crate::wording::Value;
+use handeye_wording::Value;
 
 impl App {
     /// Looks at what is neither a session nor a data set.

@@ -5,13 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use handeye_core::budget::{Budget, Limits, Spent};
-use handeye_core::image::RgbImage;
-use handeye_core::progress::CancelToken;
-use handeye_core::project::files::bounds::Bounds;
-use handeye_core::project::files::image_file;
-use handeye_core::project::import::{self, ImportError, Plan, Recording, Settings, Source, write};
-use handeye_core::targets::TargetSpec;
+use handeye_files::bounds::Bounds;
+use handeye_files::budget::{Budget, Limits, Spent};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use handeye_import::{self as import, ImportError, Plan, Recording, Settings, Source, write};
+use image::RgbImage;
 
 use super::state::{Converted, Found, ImportWork};
 use super::understand::{self, NotUnderstood};
@@ -180,7 +179,7 @@ fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
 
 fn previews(recording: &Recording) -> Vec<Vec<Arc<RgbImage>>> {
     let small =
-        |path: &PathBuf| image_file::load_rgb(path).map_or_else(|_| RgbImage::new(1, 1), |image| thumbnail(&image));
+        |path: &PathBuf| handeye_images::load_rgb(path).map_or_else(|_| RgbImage::new(1, 1), |image| thumbnail(&image));
     let of_stream = |stream: usize| {
         let has_images = recording.streams[stream].points.is_none();
         let paths = if has_images { recording.image_paths(stream) } else { Vec::new() };

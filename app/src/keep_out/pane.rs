@@ -4,7 +4,7 @@ use egui::{
     Align, Button, DragValue, Frame, Id, Label, Layout, Margin, Rect, RichText, ScrollArea, TextEdit, Ui, UiBuilder,
     Vec2, WidgetInfo, WidgetType,
 };
-use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile};
+use handeye_plan::surroundings::{KeepOutBox, KeepOutFile};
 
 use super::state::with_drawn;
 use crate::command::{Command, Outbox};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::plan::Surroundings;
-use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile, SurroundingsError};
+use handeye_plan::Surroundings;
+use handeye_plan::surroundings::{KeepOutBox, KeepOutFile, SurroundingsError};
 
 use crate::text::Text;
 

@@ -4,8 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use handeye_core::plan::Surroundings;
-use handeye_core::plan::surroundings::{KeepOutFile, SurroundingsError};
+use handeye_plan::Surroundings;
+use handeye_plan::surroundings::{KeepOutFile, SurroundingsError};
 
 use super::state::KeepOut;
 use crate::app::App;
@@ -111,7 +111,7 @@ pub(crate) fn write(file: &Path, text: &str) -> io::Result<()> {
     }
     let head =
         "# What the robot's arm keeps out of; docs/surroundings.md lists the keys. Lengths are metres in the base.\n";
-    handeye_core::project::files::atomic_file::write(file, format!("{head}{text}").as_bytes())
+    handeye_files::atomic_file::write(file, format!("{head}{text}").as_bytes())
 }
 
 #[cfg(test)]

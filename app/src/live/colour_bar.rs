@@ -1,7 +1,7 @@
 //! The bar that says which colour is which depth.
 
 use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::depth::ColourMap;
+use handeye_geometry::depth::ColourMap;
 
 use crate::gui::style::theme::{self, Palette};
 use crate::text;

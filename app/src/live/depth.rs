@@ -1,6 +1,6 @@
 //! Which depths the colours of a live depth image cover. Runs on the camera worker.
 
-use handeye_core::depth::{DepthImage, DepthSample};
+use handeye_geometry::depth::{DepthImage, DepthSample};
 
 /// Every so manyth pixel is enough to find the range. A prime, so that it does not fall into step with the columns.
 const RANGE_STRIDE: usize = 7;

@@ -4,11 +4,11 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::depth::{DepthImage, DepthSample};
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
-use handeye_core::image::RgbImage;
-use handeye_core::verify::MeasuredPoint;
+use handeye_arm::JointValues;
+use handeye_estimate::verify::MeasuredPoint;
+use handeye_geometry::depth::{ColourMap, DepthError, DepthImage, DepthSample};
+use handeye_geometry::frames::{Base, Pose, Target, Tip};
+use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
 use crate::scene::{AZIMUTH_RAD, ELEVATION_RAD};
@@ -66,6 +66,24 @@ pub struct ColouredDepth {
     pub metres: DepthImage,
     /// As the window shows it, of the same size.
     pub colours: RgbImage,
+}
+
+impl ColouredDepth {
+    /// Depths with the colours of `map` from `near_m` to `far_m`; those at the far plane of the sensor have their own.
+    ///
+    /// # Errors
+    /// As [`DepthImage::colours`].
+    pub fn new(
+        metres: DepthImage,
+        map: ColourMap,
+        [near_m, far_m]: [f32; 2],
+        far_plane_m: f32,
+    ) -> Result<Self, DepthError> {
+        let bytes = metres.colours(map, near_m, far_m, far_plane_m)?;
+        // Three bytes for each of its pixels.
+        let colours = RgbImage::from_raw(metres.width, metres.height, bytes).unwrap_or_default();
+        Ok(Self { metres, colours })
+    }
 }
 
 /// Sizes only: a million pixels say nothing in a log.

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::{ColorImage, Context, TextureFilter, TextureHandle, TextureOptions};
-use handeye_core::image::RgbImage;
-use handeye_core::project::session::CaptureId;
+use handeye_session::CaptureId;
+use image::RgbImage;
 
 use crate::live::depth;
 use crate::model::{FrameImages, Model, Observed};

@@ -1,6 +1,6 @@
 //! How the images are looked at, and points that are measured in them.
 
-use handeye_core::depth::{ColourMap, DepthSample};
+use handeye_geometry::depth::{ColourMap, DepthSample};
 use nalgebra::Vector2;
 
 use crate::app::App;

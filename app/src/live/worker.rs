@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use handeye_core::depth::{ColourMap, DepthImage};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::depth::ColourMap;
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 
 use crate::live::depth;
@@ -80,10 +80,9 @@ impl Camera {
             DepthScale::Full => limits_m,
             DepthScale::Auto => self.auto_range_m.unwrap_or(limits_m),
         };
-        let [near_m, far_m] = depth_range_m;
-        let coloured = |metres: DepthImage| match metres.colours(self.colours, near_m, far_m, far_plane_m) {
-            Ok(colours) => Ok(ColouredDepth { metres, colours }),
-            Err(error) => Err(PortError::Refused(text!("The depth image cannot be shown: {why}", why = error))),
+        let coloured = |metres| {
+            ColouredDepth::new(metres, self.colours, depth_range_m, far_plane_m)
+                .map_err(|error| PortError::Refused(text!("The depth image cannot be shown: {why}", why = error)))
         };
         let depth = raw.depth.map(coloured).transpose()?;
         self.number += 1;
@@ -153,8 +152,8 @@ impl Duty for Camera {
 mod tests {
     use std::sync::Mutex;
 
-    use handeye_core::geometry::arm::JointValues;
-    use handeye_core::image::RgbImage;
+    use handeye_arm::JointValues;
+    use image::RgbImage;
 
     use super::*;
 

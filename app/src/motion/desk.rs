@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use handeye_core::plan::Surroundings;
+use handeye_plan::Surroundings;
 use handeye_sim_link::client::CancelToken;
 
 use super::grip::{Grip, SILENCE};

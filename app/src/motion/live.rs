@@ -1,8 +1,8 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::guided::choose::Robot;
-use handeye_core::plan::{Contact, PlanError, Surroundings};
+use handeye_arm::JointValues;
+use handeye_plan::guided::choose::Robot;
+use handeye_plan::{Contact, PlanError, Surroundings};
 use handeye_sim_link::client::cell::{
     Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd,
     JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,

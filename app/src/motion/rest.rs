@@ -1,6 +1,6 @@
 //! What the states say of an arm that was stopped.
 
-use handeye_core::geometry::arm::JointKind;
+use handeye_arm::JointKind;
 use handeye_sim_link::driver::{Moved, Place, RestWatch};
 
 use crate::app::App;

@@ -1,8 +1,8 @@
 //! What the arm does and is asked to do.
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_sim_link::client::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth};
 use serde::{Deserialize, Serialize};
 

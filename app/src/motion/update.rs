@@ -1,8 +1,8 @@
 //! Moving and jogging the arm.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Camera, Pose, Tip};
-use handeye_core::project::session::CaptureId;
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Camera, Pose, Tip};
+use handeye_session::CaptureId;
 
 use crate::app::App;
 use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};

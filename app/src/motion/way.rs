@@ -1,7 +1,7 @@
 //! How far a move is.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::travel;
+use handeye_arm::JointValues;
+use handeye_plan::travel;
 
 use crate::model::{Model, MotionGoal};
 use crate::text;

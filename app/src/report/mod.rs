@@ -3,18 +3,16 @@
 mod markdown;
 mod page;
 
-use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::resolution::{angle_said, place_said};
-use handeye_core::project::result::{
-    CalibrationResult, EstimateDetails, MethodStatus, TransformEstimate, ViewRecordStatus,
-};
+use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::resolution::{angle_said, place_said};
+use handeye_result::{CalibrationResult, EstimateDetails, MethodStatus, TransformEstimate, ViewRecordStatus};
 
 pub use markdown::markdown;
 pub use page::{of_session, page, shared_camera};
 
 use crate::model::Solved;
-use crate::wording::{English, decimals, shown};
+use handeye_wording::{English, decimals, shown};
 
 /// What is said of one thing. Numbers have their units.
 #[derive(Debug, Clone, Default)]
@@ -258,7 +256,7 @@ fn methods(result: &CalibrationResult) -> Section {
     if result.methods.is_empty() {
         return Section::default();
     }
-    let row = |m: &handeye_core::project::result::MethodRecord| {
+    let row = |m: &handeye_result::MethodRecord| {
         let said = match (&m.status, m.translation_m.map(|t| t.map(|v| v * 1e3))) {
             (MethodStatus::Ok, Some([x, y, z])) => format!("[{x:9.3} {y:9.3} {z:9.3}] mm"),
             (MethodStatus::Failed(why), _) => why.clone(),
@@ -357,7 +355,7 @@ fn verification(solved: &Solved) -> Option<Section> {
 mod tests {
     use std::sync::Arc;
 
-    use handeye_core::project::result::WideningRecord;
+    use handeye_result::WideningRecord;
 
     use super::*;
     use crate::gui::testing::sample;

@@ -1,6 +1,6 @@
 //! The report as a page of text.
 
-use handeye_core::project::result::CalibrationResult;
+use handeye_result::CalibrationResult;
 
 use super::{Line, Section, camera, findings, headline, sections};
 use crate::model::Solved;

@@ -1,6 +1,6 @@
 //! How the viewer is arranged in each step of the workflow.
 
-use handeye_core::estimate::handeye::Mode;
+use handeye_estimate::handeye::Mode;
 use rerun::blueprint::components::PanelState;
 use rerun::blueprint::{
     Blueprint, ContainerLike, Horizontal, SelectionPanel, Spatial2DView, Spatial3DView, Tabs, TextDocumentView,

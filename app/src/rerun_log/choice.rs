@@ -22,7 +22,7 @@ pub enum RerunChoice {
 }
 
 /// What `--rerun` was given cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
 pub enum ChoiceError {
     /// No such word.
     #[error(

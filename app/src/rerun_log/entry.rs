@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::Surroundings;
-use handeye_core::project::session::{CaptureId, Document};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_plan::Surroundings;
+use handeye_session::{CaptureId, Document};
 
 use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, Severity, Solved, Step, Tracked};
 

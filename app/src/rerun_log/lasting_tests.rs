@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
-use handeye_core::geometry::frames::Pose;
-use handeye_core::project::session::{CaptureId, Document};
+use handeye_geometry::frames::Pose;
+use handeye_session::{CaptureId, Document};
 
 use super::*;
 use crate::model::{Observed, Severity, Step};
@@ -15,7 +15,7 @@ fn document(captures: &[u32]) -> Entry {
     let mut document = Document::new(start::meta(None, String::new()));
     for id in captures {
         let record = crate::gui::testing::sample::captured().session.document.captures[0].clone();
-        document.captures.push(handeye_core::project::session::CaptureRecord { id: CaptureId(*id), ..record });
+        document.captures.push(handeye_session::CaptureRecord { id: CaptureId(*id), ..record });
     }
     Entry::Document { folder: None, document: Arc::new(document) }
 }

@@ -1,8 +1,8 @@
 use std::sync::Arc;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::RgbImage;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::Pose;
+use image::RgbImage;
 
 use super::*;
 use crate::model::{ColouredDepth, FrameImages, FrameInfo, Severity};

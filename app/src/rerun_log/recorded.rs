@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::Surroundings;
-use handeye_core::project::session::CaptureId;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_plan::Surroundings;
+use handeye_session::CaptureId;
 
 use crate::model::Step;
 

@@ -2,7 +2,7 @@ use std::path::Path;
 use std::sync::{Condvar, Mutex};
 use std::time::Instant;
 
-use handeye_core::project::session::Document;
+use handeye_session::Document;
 use rerun::log::LogMsg;
 use rerun::sink::CallbackSink;
 
@@ -36,11 +36,7 @@ fn said(words: &str) -> Entry {
 }
 
 fn robot(sim_time_s: f64) -> Entry {
-    Entry::Robot {
-        sim_time_s,
-        base_from_tip: handeye_core::geometry::frames::Pose::identity(),
-        joints_rad: [0.1; 6].into(),
-    }
+    Entry::Robot { sim_time_s, base_from_tip: handeye_geometry::frames::Pose::identity(), joints_rad: [0.1; 6].into() }
 }
 
 /// The entities of a recording, and how many rows each has.

@@ -1,6 +1,6 @@
 use std::sync::Mutex;
 
-use handeye_core::estimate::handeye::Mode;
+use handeye_estimate::handeye::Mode;
 use rerun::log::Chunk;
 use rerun::sink::CallbackSink;
 

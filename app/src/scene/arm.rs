@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
-use handeye_core::geometry::arm::ArmKind;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::ArmKind;
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::render::{Solid, props};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::cell::ArmKinematics;
@@ -51,7 +51,7 @@ pub fn posed_arm(cell: Option<&CellFacts>, base_from_tip: &Pose<Base, Tip>, join
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::geometry::arm::JointValues;
+    use handeye_arm::JointValues;
     use handeye_sim_link::cell::render::Shape;
     use nalgebra::{Point3, Translation3};
 

@@ -1,9 +1,9 @@
 //! The captures: where each was taken, what it is for, and what the calibration makes of it.
 
-use handeye_core::estimate::{CornerResidual, ViewStatus};
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target};
-use handeye_core::geometry::statistics::median_high;
-use handeye_core::project::session::{CaptureId, CaptureRecord, Role};
+use handeye_estimate::{CornerResidual, ViewStatus};
+use handeye_geometry::frames::{Base, Camera, Pose, Target};
+use handeye_geometry::statistics::median_high;
+use handeye_session::{CaptureId, CaptureRecord, Role};
 
 use super::Known;
 use crate::model::Solved;

@@ -1,6 +1,6 @@
 //! How much room arm, cameras, boards and captures take, for whoever looks at all of them.
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::render::Shape;
 use nalgebra::{Point3, Vector3};
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::targets::TargetSpec;
+use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
 
 use super::{BoardItem, CameraItem, Fixed, Item, PlannedItem, Role};
 use crate::model::{CellFacts, Model, Solved};

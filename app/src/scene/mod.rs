@@ -14,9 +14,9 @@ pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};
 pub use extent::{AZIMUTH_RAD, ELEVATION_RAD, Extent, OPENING_RAD};
 pub use known::{Known, Truth};
 
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Frame, Pose, Target, Tip};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Frame, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
 use nalgebra::{Isometry3, Point3};
 
 use crate::model::{Model, SceneView};

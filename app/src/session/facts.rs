@@ -1,6 +1,6 @@
 //! What the bars say about the session. The only place where they look at it.
 
-use handeye_core::project::session::Edit;
+use handeye_session::Edit;
 
 use crate::model::Model;
 use crate::text;

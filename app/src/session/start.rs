@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::geometry::arm::{ArmKind, ArmModel, JointKind};
-use handeye_core::project::session::{GroundTruth, SessionMeta};
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_arm::{ArmKind, ArmModel, JointKind};
+use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_session::{GroundTruth, SessionMeta};
 use handeye_sim_link::client::cell::ArmKinematics;
 
 use crate::model::Truth;

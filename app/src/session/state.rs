@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::image::RgbImage;
-use handeye_core::project::session::{CaptureId, Document, Edit};
-use handeye_core::targets::depth_plane::DepthPlane;
-use handeye_core::targets::observation::Corners;
+use handeye_arm::JointValues;
+use handeye_geometry::targets::depth_plane::DepthPlane;
+use handeye_geometry::targets::observation::Corners;
+use handeye_session::{CaptureId, Document, Edit};
+use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
 use crate::capture::state::CapturePurpose;

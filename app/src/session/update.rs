@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::project::dataset::CameraInput;
-use handeye_core::project::export::ExportNames;
-use handeye_core::project::session::{CaptureId, Edit, Role};
-use handeye_core::project::taught_poses::TaughtPose;
-use handeye_core::targets::TargetSpec;
+use handeye_dataset::CameraInput;
+use handeye_dataset::taught_poses::TaughtPose;
+use handeye_estimate::handeye::Mode;
+use handeye_export::ExportNames;
+use handeye_geometry::targets::TargetSpec;
+use handeye_session::{CaptureId, Edit, Role};
 
 use crate::app::App;
 use crate::model::{CapturePurpose, Dialog, FrameImages, Observed, RecentSession, Review, SessionState, Severity};

@@ -1,11 +1,11 @@
 //! What the joint estimate decided and found out besides the answer, in words with units.
 
-use handeye_core::diagnose::Calibration;
-use handeye_core::diagnose::findings::WIDENING_WORTH_SAYING;
-use handeye_core::estimate::handeye::joint::PrintErrors;
-use handeye_core::estimate::{DepthsInFit, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
-use handeye_core::verify::{DepthErrors, DepthReport};
-use handeye_core::wording::shown;
+use handeye_estimate::diagnose::Calibration;
+use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
+use handeye_estimate::handeye::joint::PrintErrors;
+use handeye_estimate::verify::{DepthErrors, DepthReport};
+use handeye_estimate::{DepthsInFit, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_wording::shown;
 
 use crate::text;
 use crate::text::Text;
@@ -224,8 +224,8 @@ fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::estimate::uncertainty::widening::{Evidence, Widening};
-    use handeye_core::targets::bent::BoardShape;
+    use handeye_estimate::uncertainty::widening::{Evidence, Widening};
+    use handeye_geometry::targets::bent::BoardShape;
 
     use super::*;
     use crate::gui::testing::sample;

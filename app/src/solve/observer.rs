@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::capture::observe_image;
-use handeye_core::progress::CancelToken;
-use handeye_core::project::session::{CaptureId, CaptureRecord};
-use handeye_core::targets::TargetSpec;
+use handeye_detect::observe_image;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use handeye_session::{CaptureId, CaptureRecord};
 
 use crate::capture::thumbnail;
 use crate::command::Event;
@@ -50,7 +50,7 @@ fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet:
 
 fn look(job: &ObserveJob, capture: &CaptureRecord, cancel: &CancelToken) -> Result<Observed, Text> {
     let path = job.folder.join(&capture.image);
-    let rgb = handeye_core::project::files::image_file::load_rgb(&path)?;
+    let rgb = handeye_images::load_rgb(&path)?;
     let seen = observe_image(&rgb, &job.target, cancel)?;
     let corners = seen.map(|seen| seen.corners);
     let depth = corners

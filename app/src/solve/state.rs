@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use handeye_core::diagnose::Calibration;
-use handeye_core::diagnose::findings::Finding;
-use handeye_core::progress::Stage;
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::CaptureId;
-use handeye_core::verify::{DepthReport, Predictor, Verification, VerifyError};
+use handeye_estimate::diagnose::Calibration;
+use handeye_estimate::diagnose::findings::Finding;
+use handeye_estimate::verify::{DepthReport, Predictor, Verification, VerifyError};
+use handeye_geometry::progress::Stage;
+use handeye_result::CalibrationResult;
+use handeye_session::CaptureId;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

@@ -1,11 +1,11 @@
 //! The expected error over a box of the workspace.
 
-use handeye_core::estimate::ViewStatus;
-use handeye_core::estimate::handeye::HandEye;
-use handeye_core::estimate::uncertainty::quality::{self, BoxError, TipBox};
-use handeye_core::geometry::frames::{Base, Camera, Pose};
-use handeye_core::geometry::point_error;
-use handeye_core::project::session::Document;
+use handeye_estimate::ViewStatus;
+use handeye_estimate::handeye::HandEye;
+use handeye_estimate::uncertainty::quality::{self, BoxError, TipBox};
+use handeye_geometry::frames::{Base, Camera, Pose};
+use handeye_geometry::point_error;
+use handeye_session::Document;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use handeye_core::estimate::handeye::motion::MIN_VIEWS;
-use handeye_core::estimate::uncertainty::quality::TipBox;
-use handeye_core::estimate::{Method, Options};
-use handeye_core::progress::Stage;
-use handeye_core::project::session::{CaptureId, Document, SessionObservations};
-use handeye_core::targets::observation::{Corners, Sight};
+use handeye_estimate::handeye::motion::MIN_VIEWS;
+use handeye_estimate::uncertainty::quality::TipBox;
+use handeye_estimate::{Method, Options};
+use handeye_geometry::progress::Stage;
+use handeye_geometry::targets::observation::{Corners, Sight};
+use handeye_session::{CaptureId, Document, SessionObservations};
 
 use super::question::Question;
 use crate::app::App;

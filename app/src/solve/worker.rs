@@ -4,16 +4,16 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_core::diagnose::examine;
-use handeye_core::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
-use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{self, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
-use handeye_core::progress::{CancelToken, Progress, Work};
-use handeye_core::project::result::{DepthSummary, VerificationSummary, solve_options};
-use handeye_core::project::session::CaptureId;
-use handeye_core::targets::bent::BoardShape;
-use handeye_core::targets::observation::View;
-use handeye_core::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
+use handeye_estimate::diagnose::examine;
+use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
+use handeye_estimate::handeye::HandEyeError;
+use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
+use handeye_estimate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
+use handeye_geometry::progress::{CancelToken, Progress, Work};
+use handeye_geometry::targets::bent::BoardShape;
+use handeye_geometry::targets::observation::View;
+use handeye_result::{CalibrationResult, DepthSummary, VerificationSummary, solve_options};
+use handeye_session::CaptureId;
 
 use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
@@ -90,7 +90,7 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
     let calibration = examine(&job.observations, fit, &goal, work.cancel)?;
     let mut findings = calibration.diagnosis().findings.clone();
     let options = solve_options(job.method, job.options, &job.observations.target);
-    let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), None, options);
+    let mut result = CalibrationResult::of(&calibration, env!("CARGO_PKG_VERSION"), None, options);
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
@@ -153,10 +153,9 @@ fn summary(verification: &Verification) -> VerificationSummary {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::depth::DepthImage;
-    use handeye_core::diagnose::findings::FindingCode;
-    use handeye_core::project::result::CalibrationResult;
-    use handeye_core::targets::depth_plane::DepthPlane;
+    use handeye_estimate::diagnose::findings::FindingCode;
+    use handeye_geometry::depth::DepthImage;
+    use handeye_geometry::targets::depth_plane::DepthPlane;
 
     use super::*;
     use crate::gui::testing::sample;

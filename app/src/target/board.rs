@@ -1,8 +1,8 @@
 //! Which board is looked at: its kind and its numbers, how it looks, and the way to paper.
 
 use egui::{Button, ComboBox, DragValue, Id, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::targets::print::Page;
-use handeye_core::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+use handeye_geometry::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, IdOrder, Layout, TargetSpec};
+use handeye_print::Page;
 
 use super::drawing::drawing_ui;
 use crate::command::{Command, Outbox};
@@ -330,7 +330,7 @@ mod tests {
 
     use egui::accesskit::Role;
     use egui_kittest::kittest::Queryable as _;
-    use handeye_core::targets::print::target_pdf;
+    use handeye_print::target_pdf;
 
     use super::super::pane::target_ui;
     use super::*;

@@ -1,8 +1,8 @@
 //! A board as it is printed, on the screen.
 
 use egui::{Align2, CornerRadius, FontId, Id, Pos2, Rect, Sense, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::print::{Drawing, Shape};
+use handeye_geometry::targets::TargetSpec;
+use handeye_print::{Drawing, Shape};
 use nalgebra::Vector2;
 use std::sync::Arc;
 

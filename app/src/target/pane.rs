@@ -1,9 +1,9 @@
 //! What is looked at, where the camera sits, and what is known of it.
 
 use egui::{DragValue, Ui};
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::project::dataset::CameraInput;
+use handeye_dataset::CameraInput;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::camera::{Distortion, Intrinsics};
 
 use super::board::{board_ui, number_ui};
 use crate::command::{Command, Outbox};

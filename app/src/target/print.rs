@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::project::files::atomic_file;
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::print::{Page, target_pdf};
+use handeye_files::atomic_file;
+use handeye_geometry::targets::TargetSpec;
+use handeye_print::{Page, target_pdf};
 
 use crate::app::App;
 use crate::model::Severity;
 use crate::text;
 use crate::text::Text;
-use crate::wording::Value;
 use crate::worker::FileTask;
+use handeye_wording::Value;
 
 /// Writes it; gives what there is to say.
 pub(crate) fn write(target: &TargetSpec, page: Page, file: &Path) -> (Severity, Text) {

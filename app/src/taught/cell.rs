@@ -1,8 +1,8 @@
 //! Which taught poses belong to the cell that is connected.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::project::taught_poses::{TaughtJoint, TaughtOn, TaughtPose};
-use handeye_core::targets::TargetSpec;
+use handeye_arm::JointValues;
+use handeye_dataset::taught_poses::{TaughtJoint, TaughtOn, TaughtPose};
+use handeye_geometry::targets::TargetSpec;
 use handeye_sim_link::cell::scene::SceneChoice;
 use handeye_sim_link::client::cell::{ArmKinematics, CellPart};
 

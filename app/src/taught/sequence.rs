@@ -1,7 +1,7 @@
 //! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
 
-use handeye_core::estimate::handeye::HandEye;
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
+use handeye_estimate::handeye::HandEye;
 use handeye_sim_link::client::cell::BoardInView;
 
 use crate::app::App;

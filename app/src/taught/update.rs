@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::project::session::{Edit, TaughtChange};
-use handeye_core::project::taught_poses::{Goal, TaughtPose, TaughtPoses};
+use handeye_arm::{JointKind, JointValues};
+use handeye_dataset::taught_poses::{Goal, TaughtPose, TaughtPoses};
+use handeye_session::{Edit, TaughtChange};
 
 use crate::app::App;
 use crate::model::{MotionGoal, MotionOutcome, Severity};

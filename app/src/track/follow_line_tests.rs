@@ -1,4 +1,4 @@
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::*;
 use crate::gui::testing::sample;
@@ -9,7 +9,7 @@ fn line() -> (FollowLine, Update, Pose<Base, Tip>) {
     let setup = Setup {
         target: model.document().meta.target,
         calibrated: model.calibrated().expect("calibrated").clone(),
-        motion: handeye_core::track::MotionModel::default(),
+        motion: handeye_track::MotionModel::default(),
     };
     let line = FollowLine::default();
     line.set_up(Some(setup));

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target};
-use handeye_core::track::Update;
+use handeye_geometry::frames::{Base, Camera, Pose, Target};
 use handeye_sim_link::client::cell::BoardPath;
+use handeye_track::Update;
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use handeye_core::track::{MotionModel, Setup};
+use handeye_track::{MotionModel, Setup};
 
 use crate::app::App;
 use crate::model::{

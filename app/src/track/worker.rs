@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::targets::TargetSpec;
-use handeye_core::track::{Image, Setup, TrackError as CannotTrack, Tracker};
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_geometry::targets::TargetSpec;
+use handeye_track::{Image, Setup, TrackError as CannotTrack, Tracker};
 
 use super::follow_line::FollowLine;
 use crate::model::{TrackError, Tracked};

@@ -3,15 +3,15 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::plan::Surroundings;
-use handeye_core::plan::guided::choose::Robot;
+use handeye_arm::{ArmKind, JointKind, JointValues};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::Pose;
+use handeye_plan::Surroundings;
+use handeye_plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
+use image::{Rgb, RgbImage};
 use nalgebra::Isometry3;
 
 use super::port::{

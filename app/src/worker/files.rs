@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::Builder;
 
-use handeye_core::depth::{ColourMap, DepthImage};
-use handeye_core::plan::surroundings::KeepOutFile;
-use handeye_core::project::dataset;
-use handeye_core::project::export::{self, ExportInput, ExportNames, ExportView, Format};
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::{CaptureRecord, Session};
-use handeye_core::project::taught_poses::{TaughtPose, TaughtPoses};
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::print::Page;
+use handeye_dataset as dataset;
+use handeye_dataset::taught_poses::{TaughtPose, TaughtPoses};
+use handeye_export::{ExportInput, ExportNames, ExportView, Format};
+use handeye_geometry::depth::{ColourMap, DepthImage};
+use handeye_geometry::targets::TargetSpec;
+use handeye_plan::surroundings::KeepOutFile;
+use handeye_print::Page;
+use handeye_result::CalibrationResult;
+use handeye_session::{CaptureRecord, Session};
 
 use super::link::Outlet;
 use crate::command::Event;
@@ -173,9 +173,8 @@ fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<
     let coloured = |metres: DepthImage| {
         // A recorded depth has its far plane in it: nothing lies behind.
         let far_plane_m = metres.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
-        let [near_m, far_m] = depth::range_of(&metres, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
-        let colours = metres.colours(colours, near_m, far_m, far_plane_m)?;
-        Ok::<_, Text>(ColouredDepth { metres, colours })
+        let range_m = depth::range_of(&metres, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
+        Ok::<_, Text>(ColouredDepth::new(metres, colours, range_m, far_plane_m)?)
     };
     Ok(FrameImages { rgb, depth: depth.map(coloured).transpose()? })
 }
@@ -236,10 +235,10 @@ pub fn kind_of(folder: &Path) -> FolderKind {
 }
 
 fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, Text>)> {
-    export::formats()
+    handeye_export::formats()
         .iter()
         .map(|format| {
-            let files = export::preview(*format, &job.input())
+            let files = handeye_export::preview(*format, &job.input())
                 .map_err(Text::from)
                 .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());
             (format.name().to_owned(), files)
@@ -248,8 +247,9 @@ fn preview(job: &ExportJob) -> Vec<(String, Result<Vec<PreviewFile>, Text>)> {
 }
 
 fn write(job: &ExportJob, formats: &[String], folder: &Path) -> Result<Vec<PathBuf>, Text> {
-    let formats: Vec<&dyn Format> = formats.iter().map(|name| export::by_name(name)).collect::<Result<_, _>>()?;
-    Ok(export::write_all(folder, &formats, &job.input())?)
+    let formats: Vec<&dyn Format> =
+        formats.iter().map(|name| handeye_export::by_name(name)).collect::<Result<_, _>>()?;
+    Ok(handeye_export::write_all(folder, &formats, &job.input())?)
 }
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::thread::JoinHandle;
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::Base;
-use handeye_core::plan::Obstacle;
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
+use handeye_arm::{JointKind, JointValues};
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_geometry::frames::Base;
+use handeye_plan::Obstacle;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, CellPaths};

@@ -1,6 +1,6 @@
 //! The motion worker with a cell that does as it is told.
 
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 
@@ -344,10 +344,10 @@ fn a_connection_that_breaks_ends_the_motion_and_the_jog() {
 /// The board of the sample is tracked.
 fn tracked(bench: &Bench) {
     let model = sample::tracking();
-    bench.workers.follow.set_up(Some(handeye_core::track::Setup {
+    bench.workers.follow.set_up(Some(handeye_track::Setup {
         target: model.document().meta.target,
         calibrated: model.calibrated().expect("calibrated").clone(),
-        motion: handeye_core::track::MotionModel::default(),
+        motion: handeye_track::MotionModel::default(),
     }));
     bench.workers.follow.see(&model.track.newest.as_ref().expect("tracked").update);
 }

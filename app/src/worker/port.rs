@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::image::RgbImage;
-use handeye_core::plan::Surroundings;
-use handeye_core::plan::guided::choose::Robot;
+use handeye_arm::JointValues;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_plan::Surroundings;
+use handeye_plan::guided::choose::Robot;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
+use image::RgbImage;
 
 use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState, Severity};
 use crate::text;

@@ -1,11 +1,11 @@
 //! Calibrations and diagnoses, as the documents that the command line writes.
 
-use handeye_core::diagnose::doctor::{self, Detail};
-use handeye_core::diagnose::findings::{Finding, FindingOptions};
-use handeye_core::diagnose::{Calibration, calibrate_with};
-use handeye_core::estimate::handeye::HandEyeError;
-use handeye_core::estimate::{CalibrateError, Method, Options};
-use handeye_core::project::result::{CalibrationResult, TARGET_OPTION, solve_options};
+use handeye_estimate::diagnose::doctor::{self, Detail};
+use handeye_estimate::diagnose::findings::{Finding, FindingOptions};
+use handeye_estimate::diagnose::{Calibration, calibrate_with};
+use handeye_estimate::handeye::HandEyeError;
+use handeye_estimate::{CalibrateError, Method, Options};
+use handeye_result::{CalibrationResult, TARGET_OPTION, solve_options};
 use pyo3::prelude::*;
 use serde_json::Value;
 
@@ -85,7 +85,7 @@ fn document(
     if !observations.target_is_known {
         said.insert(TARGET_OPTION.to_owned(), Value::Null);
     }
-    let mut result = calibration.to_result(env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
+    let mut result = CalibrationResult::of(&calibration, env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
     result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
     Ok(result)
 }

@@ -4,7 +4,7 @@ use std::thread;
 use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, unbounded};
-use handeye_core::progress::{CancelToken, Progress, Work};
+use handeye_geometry::progress::{CancelToken, Progress, Work};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 

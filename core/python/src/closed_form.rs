@@ -1,7 +1,7 @@
 //! One closed form on pose pairs, as quickly as it goes.
 
-use handeye_core::estimate::handeye::PosePair;
-use handeye_core::estimate::handeye::closed_form;
+use handeye_estimate::handeye::PosePair;
+use handeye_estimate::handeye::closed_form;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

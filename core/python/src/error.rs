@@ -1,7 +1,7 @@
 //! Failures as the exceptions of the Python module.
 
-use handeye_core::estimate::CalibrateError;
-use handeye_core::estimate::handeye::HandEyeError;
+use handeye_estimate::CalibrateError;
+use handeye_estimate::handeye::HandEyeError;
 use pyo3::PyErr;
 
 /// The classes, which are Python's.

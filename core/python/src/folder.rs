@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use handeye_core::project::dataset::{Dataset, Entry};
+use handeye_dataset::{Dataset, Entry};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::json;

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::{CameraKnowledge, DEFAULT_MODEL, Observations as Observed, ObservedView};
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::nalgebra::Vector2;
-use handeye_core::project::dataset::Dataset;
-use handeye_core::targets::observation::{Corner, Corners};
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_dataset::Dataset;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Observations as Observed, ObservedView};
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::observation::{Corner, Corners};
+use handeye_geometry::targets::{Grid, TargetSpec};
+use nalgebra::Vector2;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};

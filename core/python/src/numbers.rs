@@ -1,8 +1,8 @@
 //! Arrays as bytes, and poses out of them.
 
-use handeye_core::geometry::frames::{Frame, Pose};
-use handeye_core::nalgebra::{Isometry3, Matrix3, Translation3};
-use handeye_core::project::dataset::rotation_of_matrix;
+use handeye_geometry::frames::{Frame, Pose};
+use handeye_geometry::se3::rotation_of_matrix;
+use nalgebra::{Isometry3, Matrix3, Translation3};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

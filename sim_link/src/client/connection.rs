@@ -15,7 +15,7 @@ use super::returned::Returned;
 use super::standstill::Standstill;
 use super::transport::{Transport, TransportFault, ZmqTransport};
 use crate::wire::WireError;
-use handeye_core::progress::CancelToken;
+use handeye_geometry::progress::CancelToken;
 
 /// The module of the simulator's functions, and how their names begin.
 const MODULE: &str = "sim";

@@ -6,11 +6,11 @@
 //! | matrix, 3×4, row by row: `[R | p]` | [`Pose`] |
 //! | image rows from the bottom up | row 0 on top |
 //! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthImage`], row 0 on top |
-//! | vision sensor axes: x left, y up, z forward | [`Camera`](handeye_core::geometry::frames::Camera): x right, y down, z forward |
+//! | vision sensor axes: x left, y up, z forward | [`Camera`](handeye_geometry::frames::Camera): x right, y down, z forward |
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::RgbImage;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::Pose;
+use image::RgbImage;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 
 /// How far a rotation may be off (norm of a quaternion, entries of RᵀR) before it is refused. Single precision is
@@ -21,7 +21,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 const MAX_SIDE: f64 = 16384.0;
 
 /// A value of the simulator that means nothing.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum ConvertError {
     /// A number is infinite or not a number.
@@ -92,7 +92,7 @@ pub fn pose_from_twelve<Dst, Src>(v: &[f64; 12]) -> Result<Pose<Dst, Src>, Conve
     if off_by > ROTATION_TOLERANCE {
         return Err(ConvertError::NotARotation { off_by });
     }
-    let rotation = UnitQuaternion::from_rotation_matrix(&handeye_core::geometry::se3::nearest_rotation(&r));
+    let rotation = UnitQuaternion::from_rotation_matrix(&handeye_geometry::se3::nearest_rotation(&r));
     Ok(Pose::from_isometry(Isometry3::from_parts(Translation3::new(px, py, pz), rotation)))
 }
 

@@ -1,8 +1,8 @@
 use crate::axes::sensor_from_camera;
 use approx::assert_relative_eq;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::Sensor;
-use handeye_core::geometry::frames::{Base, Camera, Tip};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::Sensor;
+use handeye_geometry::frames::{Base, Camera, Tip};
 use nalgebra::Point3;
 use nalgebra::Vector3;
 

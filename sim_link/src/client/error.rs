@@ -2,18 +2,18 @@
 
 use std::time::Duration;
 
-use handeye_core::geometry::arm::JointQuantity;
+use handeye_arm::JointQuantity;
 
 use super::cell::{CellPart, version_name};
 use super::convert::ConvertError;
 use super::endpoint::{BadEndpoint, Endpoint};
 use super::sim::SimulationState;
 use crate::wire::{MAX_MESSAGE_BYTES, MAX_REPLY_BYTES, WireError};
-use handeye_core::text;
-use handeye_core::wording::Text;
+use handeye_wording::Text;
+use handeye_wording::text;
 
 /// Why a call, or a task made of calls, has no result. Each message says what to do next.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum LinkError {
     /// The address cannot be used.
@@ -170,7 +170,7 @@ pub enum LinkError {
     #[error(
         "{count} joints carry the tip and at most {most} are driven; set the object path \"arm\" to the object that its first \
          joint hangs on",
-        most = handeye_core::geometry::arm::MAX_JOINTS
+        most = handeye_arm::MAX_JOINTS
     )]
     TooManyJoints {
         /// Joints between base and tip.
@@ -278,7 +278,7 @@ pub enum LinkError {
     #[error("nothing was moved: {contact}")]
     InTheWay {
         /// To what.
-        contact: handeye_core::plan::Contact,
+        contact: handeye_plan::Contact,
     },
     /// No motion fits the limits.
     #[error("no motion fits these limits of velocity, acceleration and jerk: {reason}")]

@@ -25,7 +25,7 @@ mod transport;
 pub use connection::Connection;
 pub use endpoint::{BadEndpoint, DEFAULT_PORT, Endpoint};
 pub use error::LinkError;
-pub use handeye_core::progress::CancelToken;
+pub use handeye_geometry::progress::CancelToken;
 pub use options::{CallOptions, ConnectionOptions};
 pub use returned::Returned;
 pub use sim::{

@@ -5,7 +5,7 @@ use ciborium::Value;
 use super::convert::{self, ConvertError};
 use super::error::LinkError;
 use crate::wire::{self, Reader};
-use handeye_core::geometry::frames::Pose;
+use handeye_geometry::frames::Pose;
 
 /// The values that a call returned, in order.
 #[derive(Debug, Clone, PartialEq)]

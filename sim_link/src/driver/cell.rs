@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::image::RgbImage;
-use handeye_core::progress::CancelToken;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::progress::CancelToken;
+use image::RgbImage;
 
 use super::client::Driver;
 use super::clock::Timebase;

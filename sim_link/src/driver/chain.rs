@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use handeye_core::geometry::arm::urdf::Urdf;
-use handeye_core::geometry::arm::{Arm, ArmKind};
+use handeye_arm::urdf::Urdf;
+use handeye_arm::{Arm, ArmKind};
 
 use super::message::{ArmMessage, Hello};
 

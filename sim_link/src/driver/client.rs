@@ -6,11 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::arm::Arm;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::image::RgbImage;
-use handeye_core::progress::CancelToken;
+use handeye_arm::Arm;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::progress::CancelToken;
+use image::RgbImage;
 
 use super::clock::{Offset, Timebase};
 use super::error::{DriverError, Ending};

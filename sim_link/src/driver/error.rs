@@ -7,7 +7,7 @@ use super::spec::BadSpec;
 use super::wire::WireError;
 
 /// Why a driver does not do what it is asked for. Each names the driver.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum DriverError {
     /// The text names none.
@@ -101,7 +101,7 @@ impl DriverError {
 }
 
 /// How a connection to a driver ended.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum Ending {
     /// The process ended by itself.

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use handeye_core::progress::CancelToken;
+use handeye_geometry::progress::CancelToken;
 
 use super::cell::{DriverCell, DriverCellSpec};
 use super::error::DriverError;

@@ -2,8 +2,8 @@
 
 use std::io::Cursor;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::image::{ImageFormat, ImageReader, Limits, RgbImage};
+use handeye_geometry::depth::DepthImage;
+use image::{ImageFormat, ImageReader, Limits, RgbImage};
 
 use super::message::{DepthEncoding, DepthMessage, ImageEncoding, ImageMessage, MAX_IMAGE_SIDE};
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::Arm;
+use handeye_arm::Arm;
 
 use super::chain;
 use super::clock::ClockOffset;

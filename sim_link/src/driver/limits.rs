@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use handeye_core::capture::NO_IMAGES_S;
+use handeye_capture::NO_IMAGES_S;
 
 /// The states before and after an image are no farther apart than this \[s\]: they say too little of what was between them.
 pub const STATES_APART_S: f64 = 0.25;

@@ -1,8 +1,9 @@
 //! Motions of one driver: allowed, begun, and ended.
 
-use handeye_core::geometry::arm::{DISTANCE_LIMIT_M, JointValues, ROTATION_LIMIT_RAD};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::progress::CancelToken;
+use handeye_arm::JointValues;
+use handeye_estimate::placement::{DISTANCE_LIMIT_M, ROTATION_LIMIT_RAD};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
 
 use super::client::Driver;
 use super::error::{DriverError, Ending};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use handeye_core::progress::CancelToken;
+use handeye_geometry::progress::CancelToken;
 
 use super::clock::Timebase;
 

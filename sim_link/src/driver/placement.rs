@@ -12,10 +12,9 @@
 
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::{
-    Arm, ArmKind, DISTANCE_LIMIT_M, JointRange, JointValues, JointView, ROTATION_LIMIT_RAD, place,
-};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::{Arm, ArmKind, JointRange, JointValues};
+use handeye_estimate::placement::{DISTANCE_LIMIT_M, JointView, ROTATION_LIMIT_RAD, place};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Vector3};
 
 use super::message::{ArmMessage, Hello, StateMessage};

@@ -1,4 +1,4 @@
-use handeye_core::geometry::arm::JointKind;
+use handeye_arm::JointKind;
 
 use super::*;
 use crate::driver::message::{Ability, JointMessage, PoseMessage};

@@ -1,8 +1,8 @@
 //! Whether an arm is at rest, by what its states say and by nothing else: a controller that says `done` may have been asked by another
 //! program in the meantime, or mean that it has read the command.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
 
 /// For how long an arm that stands has not moved \[s\]: two states at the lowest rate of the protocol.
 pub const REST_S: f64 = 0.2;

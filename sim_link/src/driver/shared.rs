@@ -4,7 +4,7 @@ use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use handeye_core::progress::CancelToken;
+use handeye_geometry::progress::CancelToken;
 
 use super::error::{DriverError, Ending};
 pub use super::inner::{Burial, FrameRequest, Inner, Progress};

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use handeye_core::geometry::arm::{Arm, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::geometry::se3;
+use handeye_arm::{Arm, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::se3;
 
 use super::limits::STATES_APART_S;
 use super::message::{BadMessage, PoseMessage, StateMessage};
@@ -52,7 +52,7 @@ pub struct RobotAt {
 }
 
 /// Why an image has no pose.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum NoPose {
     /// There is no robot.

@@ -1,4 +1,4 @@
-use handeye_core::nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 
 use super::*;
@@ -92,7 +92,7 @@ fn the_tip_is_found_from_the_flange_and_its_tool_or_from_the_joints_of_a_known_c
     assert_eq!(Reading::of(&both, 0, None).unwrap().base_from_tip.translation().x, 2.0);
     assert!(Reading::of(&empty, 0, None).is_err());
 
-    let arm = handeye_core::geometry::arm::ArmKind::Ur5e.arm();
+    let arm = handeye_arm::ArmKind::Ur5e.arm();
     let joints = JointValues::from([0.1, -1.0, 1.2, -0.4, 0.3, 0.2]);
     let state = StateMessage { joints_rad: Some(joints), ..empty.clone() };
     let read = Reading::of(&state, 6, Some(&arm)).unwrap();

@@ -28,7 +28,7 @@ pub struct Incoming {
 }
 
 /// A message that breaks the protocol, with the line.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
 #[error("message {number}: {problem}: {excerpt}")]
 pub struct WireError {
     /// Which line of the conversation it was, counted from 1.
@@ -40,7 +40,7 @@ pub struct WireError {
 }
 
 /// What is wrong with a message.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum WireProblem {
     /// No end of line within [`MAX_LINE`].
@@ -114,7 +114,7 @@ impl fmt::Display for Excerpt {
     }
 }
 
-handeye_core::plain_values!(Excerpt);
+handeye_wording::plain_values!(Excerpt);
 
 /// Reads the messages of a driver. After an error there is no way to tell where the next message begins.
 #[derive(Debug)]

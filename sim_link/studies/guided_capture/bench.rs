@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use handeye_core::estimate::handeye::joint::{ExpectedView, ViewModel};
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::geometry::se3;
-use handeye_core::nalgebra::{Matrix6, Point3, UnitQuaternion, Vector3};
-use handeye_core::plan::guided::GuidedOptions;
-use handeye_core::plan::guided::candidates::ViewRange;
-use handeye_core::plan::guided::design::{Design, weight_about};
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
-use handeye_core::testing::guided_cell::GuidedCell;
-use handeye_core::testing::sessions::BOARD;
+use handeye_arm::JointValues;
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_estimate::handeye::joint::{ExpectedView, ViewModel};
+use handeye_estimate::testing::sessions::BOARD;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::se3;
+use handeye_plan::guided::GuidedOptions;
+use handeye_plan::guided::candidates::ViewRange;
+use handeye_plan::guided::design::{Design, weight_about};
+use handeye_plan::testing::guided_cell::GuidedCell;
 use handeye_sim_link::cell::scene::Scene;
+use nalgebra::{Matrix6, Point3, UnitQuaternion, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 

@@ -1,6 +1,6 @@
 //! How good poses are that are chosen in different ways.
 
-use handeye_core::testing::guided_cell::{CellSetup, GuidedCell};
+use handeye_plan::testing::guided_cell::{CellSetup, GuidedCell};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use super::bench::{Bench, NAMES, Way, Ways};

@@ -29,12 +29,12 @@ mod stop;
 use std::env;
 use std::time::Instant;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::plan::guided::by_hand::{HandGuide, HandNext};
-use handeye_core::plan::guided::{Ending, Guide, GuidedOptions};
-use handeye_core::progress::CancelToken;
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
-use handeye_core::testing::hand;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::progress::CancelToken;
+use handeye_plan::guided::by_hand::{HandGuide, HandNext};
+use handeye_plan::guided::{Ending, Guide, GuidedOptions};
+use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell};
+use handeye_plan::testing::hand;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 /// Numbers of views that are compared.

@@ -2,15 +2,15 @@
 
 use std::f64::consts::PI;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::handeye::joint::Noise;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Anchor, Camera, Mount, Pose, Target};
-use handeye_core::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use handeye_core::plan::{Arm, Obstacle, Surroundings, ViewSetup};
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places};
-use handeye_core::testing::sessions::BOARD;
+use handeye_arm::JointValues;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::handeye::joint::Noise;
+use handeye_estimate::testing::sessions::BOARD;
+use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places};
+use handeye_plan::{Arm, Obstacle, Surroundings, ViewSetup};
 use handeye_sim_link::cell::scene::{BoardSpec, RelativeTo, RobotSpec, Scene, ShippedScene};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 

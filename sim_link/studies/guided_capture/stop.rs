@@ -1,10 +1,10 @@
 //! What is true when guided capture ends by itself.
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::handeye::joint::Noise;
-use handeye_core::plan::guided::{Ending, GuidedOptions, Step};
-use handeye_core::testing::guided_cell::{CellArm, CellSetup, GuidedCell, GuidedRun, Untold};
-use handeye_core::testing::sessions::REALISTIC;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::handeye::joint::Noise;
+use handeye_estimate::testing::sessions::REALISTIC;
+use handeye_plan::guided::{Ending, GuidedOptions, Step};
+use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, GuidedRun, Untold};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 pub fn stop(sessions: u64, only: &str) {

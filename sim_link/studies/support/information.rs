@@ -1,7 +1,7 @@
 //! What a session says about hand-eye transform, place of the board and joint offsets: the linear model at the truth.
 
-use handeye_core::geometry::frames::Pose;
-use handeye_core::geometry::se3::{adjoint, skew};
+use handeye_geometry::frames::Pose;
+use handeye_geometry::se3::{adjoint, skew};
 use handeye_sim_link::cell::recorded::RecordedSession;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SymmetricEigen, Vector6};
 

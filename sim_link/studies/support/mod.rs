@@ -1,6 +1,6 @@
 //! The cell of the public reference scene, for images and timings.
 
-use handeye_core::geometry::camera::Intrinsics;
+use handeye_geometry::camera::Intrinsics;
 use handeye_sim_link::cell::render::{BoardSurface, Light, RenderScene, props};
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 

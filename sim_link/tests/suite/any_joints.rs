@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::cell::{
     Arm, ArmJog, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowWish, JogAxes, JogEnd, JogObstacle,

@@ -1,8 +1,8 @@
 //! Motions, jogs and stops of the arm against the real cell over a socket.
 
 use ciborium::Value;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_sim_link::cell::scene::{JointModeSpec, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{

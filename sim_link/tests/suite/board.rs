@@ -1,6 +1,6 @@
 //! A board that moves and hides, and frames of one instant, against the real cell over a socket.
 
-use handeye_core::geometry::frames::PointIn;
+use handeye_geometry::frames::PointIn;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, BoardMotion, BoardPath, CameraFeed, CellPaths, Frame};

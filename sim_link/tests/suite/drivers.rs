@@ -7,8 +7,8 @@ use std::process::Command;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::testing::python;
+use handeye_arm::JointValues;
+use handeye_geometry::testing::python;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::CancelToken;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{

@@ -1,7 +1,7 @@
 //! What stands around, read from a running cell, and motions that end before it.
 
-use handeye_core::geometry::frames::Pose;
-use handeye_core::plan::{Obstacle, SpeedLimits, Surroundings};
+use handeye_geometry::frames::Pose;
+use handeye_plan::{Obstacle, SpeedLimits, Surroundings};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::cell::{ArmJog, Contact, JogAxes, JogEnd, JogObstacle, MotionTolerance};
 use handeye_sim_link::client::{CancelToken, LinkError, MotionLimits};

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use handeye_core::estimate::handeye::HandEye;
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
-use handeye_core::project::dataset::write;
-use handeye_core::project::export::{self, CameraLink, ExportInput, ExportNames, ExportView};
-use handeye_core::project::result::{CalibrationResult, IntrinsicsEstimate, Quality};
-use handeye_core::testing::python;
+use handeye_dataset::write;
+use handeye_estimate::handeye::HandEye;
+use handeye_export::{CameraLink, ExportInput, ExportNames, ExportView};
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::frames::{Base, Pose, Target, Tip};
+use handeye_geometry::testing::python;
+use handeye_result::{CalibrationResult, IntrinsicsEstimate, Quality};
 use handeye_tests::{handeye_binary, workspace_root};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde_json::json;
@@ -61,9 +61,12 @@ fn views() -> Vec<ExportView> {
 fn write_case(folder: &Path, result: &CalibrationResult, names: &ExportNames) -> Vec<&'static str> {
     let views = views();
     let input = ExportInput { result, names, views: &views };
-    let formats: Vec<_> =
-        export::formats().iter().copied().filter(|format| export::preview(*format, &input).is_ok()).collect();
-    export::write_all(&folder.join("exports"), &formats, &input).unwrap_or_else(|error| panic!("{error}"));
+    let formats: Vec<_> = handeye_export::formats()
+        .iter()
+        .copied()
+        .filter(|format| handeye_export::preview(*format, &input).is_ok())
+        .collect();
+    handeye_export::write_all(&folder.join("exports"), &formats, &input).unwrap_or_else(|error| panic!("{error}"));
     let poses: Vec<_> = views
         .iter()
         .map(|v| {
@@ -133,7 +136,7 @@ fn the_readers_of_every_format_find_the_calibration_in_it() {
             seen.extend(write_case(&case, &result_of(links, *lens), names));
         }
     }
-    let all: BTreeSet<_> = export::formats().iter().map(|format| format.name()).collect();
+    let all: BTreeSet<_> = handeye_export::formats().iter().map(|format| format.name()).collect();
     assert_eq!(seen, all, "a format was never written");
     read_with_python(&[Path::new("--cases"), folder.path()]);
 }

@@ -2,7 +2,8 @@
 
 use std::process::Command;
 
-use handeye_core::testing::{arms, python};
+use handeye_arm::testing as arms;
+use handeye_geometry::testing::python;
 use handeye_tests::workspace_root;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

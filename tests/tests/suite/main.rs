@@ -7,7 +7,6 @@ mod exports;
 mod hostile_clients;
 mod imports;
 mod kinematics;
-mod layering;
 mod reference_sets;
 mod renderer_truth;
 mod rerun_doors;
@@ -19,6 +18,7 @@ mod shared_intrinsics;
 mod solved;
 #[cfg(unix)]
 mod streams;
+mod walls;
 
 mod slow {
     mod asleep;

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::process::Command;
 
-use handeye_core::project::result::{CalibrationResult, ViewRecordStatus};
-use handeye_core::testing::data_folder;
+use handeye_geometry::testing::data_folder;
+use handeye_result::{CalibrationResult, ViewRecordStatus};
 use handeye_tests::handeye_binary;
 
 /// What is known of a set: hand-eye translation \[mm\] with the limit of its error, and focal length \[px\].

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use ciborium::Value;
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
 use handeye_sim_link::wire::Reader as _;
 use handeye_tests::coppeliasim::{Call, StandIn};
 use handeye_tests::{CellProcess, workspace_root};

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use handeye_core::project::result::{CalibrationResult, ViewRecordStatus};
-use handeye_core::project::session::{CaptureId, Edit, Role, Store};
+use handeye_result::{CalibrationResult, ViewRecordStatus};
+use handeye_session::{CaptureId, Edit, Role, Store};
 use serde_json::Value;
 
 use crate::solved::{copy_of_session, handeye, text, utf8};

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::testing::sessions::{REALISTIC, camera, trial};
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::testing::sessions::{REALISTIC, camera, trial};
+use handeye_geometry::camera::Intrinsics;
+use handeye_result::CalibrationResult;
 use serde_json::Value;
 
 use crate::solved::{handeye, text, utf8};

@@ -6,7 +6,7 @@ use std::os::unix::fs::{FileTypeExt as _, symlink};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use handeye_core::project::result::CalibrationResult;
+use handeye_result::CalibrationResult;
 use serde_json::Value;
 
 use crate::solved::{command, copy_of_session, handeye, solved, text, utf8};

@@ -1,6 +1,6 @@
 //! What is remarkable about a capture, why, and what to do.
 
-use handeye_core::diagnose::findings::FindingCode;
+use handeye_estimate::diagnose::findings::FindingCode;
 
 use crate::capture::rows::{CaptureRow, Detected};
 use crate::gui::style::theme::Tone;

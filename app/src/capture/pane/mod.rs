@@ -7,7 +7,7 @@ mod selecting;
 mod table;
 
 use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::project::session::CaptureId;
+use handeye_session::CaptureId;
 
 use crate::by_hand;
 use crate::capture::rows::{self, CaptureTable};

@@ -1,7 +1,7 @@
 //! Which captures are selected after a click or a key.
 
 use egui::Modifiers;
-use handeye_core::project::session::CaptureId;
+use handeye_session::CaptureId;
 
 /// The selection after a click on a row. `order` is that of the rows on the screen; the last one selected is the one
 /// that is looked at. With Shift the rows from `anchor` to the clicked one are selected, with Ctrl one is added or

@@ -1,7 +1,7 @@
 //! The table: heads, the rows that can be seen, selection by pointer and keys.
 
 use egui::{EventFilter, Id, Key, Modifiers, Rect, ScrollArea, Sense, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::project::session::{CaptureId, Role};
+use handeye_session::{CaptureId, Role};
 
 use super::columns::{self, HEAD, Sort};
 use super::flags::Circumstances;

@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use handeye_core::plan::guided::{Ending, GuidedOptions};
-use handeye_core::project::session::{CaptureId, CaptureRecord};
+use handeye_plan::guided::{Ending, GuidedOptions};
+use handeye_session::{CaptureId, CaptureRecord};
 
 use super::columns::{Column, Sort, sorted};
 use super::*;

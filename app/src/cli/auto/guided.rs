@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use handeye_core::diagnose::{Calibration, calibrate};
-use handeye_core::estimate::{Method, Observations};
-use handeye_core::plan::Surroundings;
-use handeye_core::plan::guided::choose::{Proposal, Robot};
-use handeye_core::plan::guided::{Ending, Guide, Known, Next};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::session::CaptureId;
-use handeye_core::project::taught_poses::Goal;
-use handeye_core::targets::observation::Sight;
+use handeye_dataset::taught_poses::Goal;
+use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::{Method, Observations};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::observation::Sight;
+use handeye_plan::Surroundings;
+use handeye_plan::guided::choose::{Proposal, Robot};
+use handeye_plan::guided::{Ending, Guide, Known, Next};
+use handeye_session::CaptureId;
 use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::super::Failure;

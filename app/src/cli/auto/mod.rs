@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use handeye_core::estimate::uncertainty::quality::TipBox;
-use handeye_core::estimate::{Method, Options};
-use handeye_core::plan::Surroundings;
-use handeye_core::plan::guided::record::GUIDED_RECORD;
-use handeye_core::plan::guided::{CHECKS, Guide, GuidedOptions};
-use handeye_core::project::session::{FolderLock, Session, SessionMeta, Store};
+use handeye_estimate::uncertainty::quality::TipBox;
+use handeye_estimate::{Method, Options};
+use handeye_plan::Surroundings;
+use handeye_plan::guided::{CHECKS, Guide, GuidedOptions};
+use handeye_result::guided_record::GUIDED_RECORD;
+use handeye_session::guided::guided_record;
+use handeye_session::{FolderLock, Session, SessionMeta, Store};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{Arm, ArmKinematics, CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
@@ -255,7 +256,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         tracing::warn!("{captures} kept in {folder}; `handeye calibrate {folder}` solves it");
     }
     if let Some(guide) = &guide {
-        guide.record().write(&folder.join(GUIDED_RECORD)).map_err(Failure::failed)?;
+        guided_record(guide).write(&folder.join(GUIDED_RECORD)).map_err(Failure::failed)?;
     }
     let ending = captured?;
     if let Err(error) = ended {
@@ -267,7 +268,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let goal_m = guide.as_ref().map_or(Goal::default().0, |guide| guide.options().goal_m);
     let truth = Some(Truth::from(&truth));
     let mut solution = solve::folder(&folder, Method::Joint, Options::default(), goal_m, truth, &cancel)?;
-    solution.guided_by(guide.as_ref().map(Guide::record));
+    solution.guided_by(guide.as_ref().map(guided_record));
     finish(&session, args.json.as_ref(), &solution)?;
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)?;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
-use handeye_core::project::taught_poses::{Goal, MotionLimits, TaughtPoses};
+use handeye_arm::JointValues;
+use handeye_dataset::taught_poses::{Goal, MotionLimits, TaughtPoses};
+use handeye_plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
 use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
 use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 

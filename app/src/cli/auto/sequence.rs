@@ -3,9 +3,9 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use handeye_core::progress::CancelToken;
-use handeye_core::project::session::{CaptureId, Store};
-use handeye_core::project::taught_poses::Goal;
+use handeye_dataset::taught_poses::Goal;
+use handeye_geometry::progress::CancelToken;
+use handeye_session::{CaptureId, Store};
 use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use handeye_core::project::dataset::PoseFormat;
+use handeye_dataset::PoseFormat;
 use handeye_sim_link::drivers::folder::{Folder, FolderOptions};
 
 use super::{serve, size};

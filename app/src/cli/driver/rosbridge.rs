@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::geometry::arm::urdf::Urdf;
-use handeye_core::geometry::arm::{Joint, JointKind};
+use handeye_arm::urdf::Urdf;
+use handeye_arm::{Joint, JointKind};
 use handeye_sim_link::driver::message::{ArmMessage, JointMessage};
 use handeye_sim_link::drivers::rosbridge::{Rosbridge, RosbridgeOptions};
 

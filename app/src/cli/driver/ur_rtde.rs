@@ -1,7 +1,7 @@
 //! `handeye driver ur-rtde`: a controller of Universal Robots.
 
 use clap::Args;
-use handeye_core::geometry::arm::ArmKind;
+use handeye_arm::ArmKind;
 use handeye_sim_link::driver::message::ArmMessage;
 use handeye_sim_link::drivers::ur_rtde::{PORT, RtdeOptions, UrRtde, UrRtdeOptions};
 

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use handeye_core::estimate::handeye::joint::SmallSample;
-use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::project::result::{CalibrationResult, PrintEstimate, TARGET_OPTION};
-use handeye_core::project::session::{RESULT, Session};
-use handeye_core::targets::bent::BoardShape;
-use handeye_core::targets::{Grid, TargetSpec};
-use handeye_core::verify::Predictor;
+use handeye_estimate::handeye::joint::SmallSample;
+use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_estimate::verify::Predictor;
+use handeye_geometry::targets::bent::BoardShape;
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_result::{CalibrationResult, PrintEstimate, TARGET_OPTION};
+use handeye_session::{RESULT, Session};
 
 use crate::cli::Failure;
 
@@ -27,7 +27,7 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
     let intrinsics = result
         .intrinsics
         .as_ref()
-        .and_then(handeye_core::project::result::IntrinsicsEstimate::intrinsics)
+        .and_then(handeye_result::IntrinsicsEstimate::intrinsics)
         .ok_or_else(|| unusable("intrinsics"))?;
     intrinsics.validate().map_err(Failure::unusable)?;
     let target = if is_session {

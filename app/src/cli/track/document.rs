@@ -4,8 +4,8 @@ use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::anyhow;
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::track::State;
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_track::State;
 use serde_json::{Value, json};
 
 use super::live::Summary;

@@ -7,11 +7,11 @@ mod live;
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_core::track::{MotionModel, Setup};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::Endpoint;
 use handeye_sim_link::client::cell::CellPaths;
 use handeye_sim_link::client::cell::{BoardMotion, BoardPath};
+use handeye_track::{MotionModel, Setup};
 
 use super::cell::SceneArg;
 use super::output::Output;

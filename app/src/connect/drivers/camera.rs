@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::driver::message::Ability;
 use handeye_sim_link::driver::{DriverCell, NoPose, limits};

@@ -1,7 +1,7 @@
 //! The robot behind a driver: where it is, whether it may be moved, stop.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::cell::ArmKinematics;
 use handeye_sim_link::driver::message::Ability;
 use handeye_sim_link::driver::{ChainPlacement, Driver, DriverCell, LogLevel};

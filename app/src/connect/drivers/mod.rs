@@ -11,7 +11,7 @@ pub(crate) mod typed_pose;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions, NoCell};
 

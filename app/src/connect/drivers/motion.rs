@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::guided::choose::Robot;
-use handeye_core::plan::{Contact, Surroundings};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_plan::guided::choose::Robot;
+use handeye_plan::{Contact, Surroundings};
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
 use handeye_sim_link::driver::message::Ability;

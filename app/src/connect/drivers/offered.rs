@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use handeye_core::geometry::arm::ArmKind;
+use handeye_arm::ArmKind;
 use handeye_sim_link::cell::scene::ShippedScene;
 use handeye_sim_link::driver::DriverSpec;
 

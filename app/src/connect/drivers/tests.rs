@@ -5,8 +5,8 @@ use std::net::TcpListener;
 use std::sync::Arc;
 use std::thread;
 
-use handeye_core::geometry::frames::Pose;
-use handeye_core::plan::{Obstacle, Surroundings};
+use handeye_geometry::frames::Pose;
+use handeye_plan::{Obstacle, Surroundings};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::client::cell::ArmKinematics;

@@ -1,8 +1,8 @@
 //! The pose that a robot's pendant shows, typed or pasted: where no driver reports it.
 
 use egui::{Button, ComboBox, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
-use handeye_core::geometry::frames::Pose;
-use handeye_core::project::typed_pose::{self, TypedPoseError, TypedRotation};
+use handeye_dataset::typed_pose::{self, TypedPoseError, TypedRotation};
+use handeye_geometry::frames::Pose;
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;
@@ -118,7 +118,7 @@ fn fault(error: &TypedPoseError) -> Text {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::geometry::frames::{Base, Tip};
+    use handeye_geometry::frames::{Base, Tip};
 
     use super::*;
     use crate::gui::testing::driven::Driven;

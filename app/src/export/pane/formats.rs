@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use egui::{Align, Layout, Ui, WidgetInfo, WidgetType};
-use handeye_core::project::export::{self, Format};
+use handeye_export::Format;
 
 use super::preview;
 use crate::command::{Command, Outbox};
@@ -20,20 +20,22 @@ pub fn formats_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 outbox.send(Command::ChooseFormats(BTreeSet::new()));
             }
             if ui.add(parts::small_button(ui, tr!(language, "Choose all"))).clicked() {
-                let possible =
-                    export::formats().iter().map(|format| format.name()).filter(|name| is_possible(model, name));
+                let possible = handeye_export::formats()
+                    .iter()
+                    .map(|format| format.name())
+                    .filter(|name| is_possible(model, name));
                 outbox.send(Command::ChooseFormats(possible.map(str::to_owned).collect()));
             }
         });
     });
-    for format in export::formats() {
+    for format in handeye_export::formats() {
         format_ui(ui, model, *format, outbox);
     }
 }
 
 /// Formats that are chosen and can hold this result.
 pub fn chosen(model: &Model) -> Vec<&'static str> {
-    let names = export::formats().iter().map(|format| format.name());
+    let names = handeye_export::formats().iter().map(|format| format.name());
     names.filter(|name| model.export.chosen.contains(*name) && is_possible(model, name)).collect()
 }
 

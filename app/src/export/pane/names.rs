@@ -1,8 +1,8 @@
 //! Names of frames and files, and what the transform in the files means with them.
 
 use egui::{Grid, Id, Label, RichText, TextEdit, Ui};
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::project::export::ExportNames;
+use handeye_estimate::handeye::Mode;
+use handeye_export::ExportNames;
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;

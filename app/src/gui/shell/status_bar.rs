@@ -2,7 +2,7 @@
 
 use egui::{Button, Label, RichText, Sense, Ui};
 
-use handeye_core::geometry::arm::{JointKind, MAX_JOINTS};
+use handeye_arm::{JointKind, MAX_JOINTS};
 
 use crate::command::{Command, Outbox};
 use crate::gui::status::{STALE_AFTER_S, robot_age};

@@ -4,7 +4,7 @@ use egui::text::LayoutJob;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2};
 
 use super::theme::Palette;
-use handeye_core::depth::ColourMap;
+use handeye_geometry::depth::ColourMap;
 
 /// Colours with a meaning of their own, besides the [`Palette`].
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Numbers as text, always of the same width so that they do not dance: the fonts have digits of equal width, and what
 //! pads them is as wide as a digit.
 
-use handeye_core::geometry::frames::{Base, Pose};
+use handeye_geometry::frames::{Base, Pose};
 
 /// A space as wide as a digit.
 const FIGURE_SPACE: &str = "\u{2007}";
@@ -46,7 +46,7 @@ pub fn quaternion<Src>(pose: &Pose<Base, Src>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::geometry::frames::Tip;
+    use handeye_geometry::frames::Tip;
 
     use super::*;
 

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use egui::{Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, HarnessBuilder};
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::{Rgb, RgbImage};
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::Pose;
 use handeye_sim_link::client::cell::CellPaths;
+use image::{Rgb, RgbImage};
 
 use super::shell::layout::Layout;
 use super::window::Window;

@@ -1,25 +1,26 @@
 //! Models for tests of panes: a window at work, from a made-up chain whose truth is known.
 
+use handeye_result::CalibrationResult;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::depth::{ColourMap, DepthImage};
-use handeye_core::diagnose::Calibration;
-use handeye_core::diagnose::findings::{self, Finding, FindingOptions};
-use handeye_core::estimate::handeye::screening::Distance;
-use handeye_core::estimate::handeye::{HandEye, Mode};
-use handeye_core::estimate::{self, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
-use handeye_core::geometry::arm::{ArmKind, JointKind, JointValues};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::progress::CancelToken;
-use handeye_core::project::export::{self, ExportInput};
-use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Role};
-use handeye_core::targets::observation::{Corner, Corners, View};
-use handeye_core::track::{BoardDetection, ByDepth, Estimate, State, Update};
-use handeye_core::verify::{self, Predictor};
+use handeye_arm::{ArmKind, JointKind, JointValues};
+use handeye_estimate::diagnose::Calibration;
+use handeye_estimate::diagnose::findings::{self, Finding, FindingOptions};
+use handeye_estimate::handeye::screening::Distance;
+use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_estimate::verify::{self, Predictor};
+use handeye_estimate::{self as estimate, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
+use handeye_export::ExportInput;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::{ColourMap, DepthImage};
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::observation::{Corner, Corners, View};
+use handeye_session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_sim_link::client::cell::ArmKinematics;
+use handeye_track::{BoardDetection, ByDepth, Estimate, State, Update};
+use image::{Rgb, RgbImage};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
@@ -115,8 +116,8 @@ pub fn images() -> FrameImages {
     let rgb = RgbImage::from_fn(width, height, |column, row| Rgb([(column / 4) as u8, (row / 4) as u8, 120]));
     let metres = (0..width * height).map(|i| 0.3 + 0.2 * (i % width) as f32 / width as f32).collect();
     let metres = DepthImage { width, height, metres };
-    let colours = metres.colours(ColourMap::Turbo, 0.3, 0.5, 3.5).expect("an image");
-    FrameImages { rgb, depth: Some(ColouredDepth { metres, colours }) }
+    let depth = ColouredDepth::new(metres, ColourMap::Turbo, [0.3, 0.5], 3.5).expect("an image");
+    FrameImages { rgb, depth: Some(depth) }
 }
 
 /// Connected, with a live image in which the board is seen, and nothing captured.
@@ -231,7 +232,7 @@ pub fn solved() -> Model {
     let cancel = CancelToken::default();
     let calibration = Calibration::as_modelled(estimate::fit(&observations, Method::Joint, &cancel).expect("a fit"));
     assert!(matches!(calibration.hand_eye, Some(HandEye::EyeInHand { .. })));
-    let mut result = calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
+    let mut result = CalibrationResult::of(&calibration, "0.1.0", None, std::collections::BTreeMap::new());
     result.truth = truth::comparison(&result, &tip_from_camera(), &intrinsics());
     let calibrated = Predictor::new(&calibration).expect("a hand-eye");
     let checks: Vec<View> =
@@ -277,7 +278,7 @@ pub fn with_an_outlier() -> Model {
     view.rms_px = Some(18.0);
     (view.influence_m, view.correction_m, view.correction_rad) = (None, None, None);
     let truth = solved.result.truth.take();
-    solved.result = solved.calibration.to_result("0.1.0", None, std::collections::BTreeMap::new());
+    solved.result = CalibrationResult::of(&solved.calibration, "0.1.0", None, std::collections::BTreeMap::new());
     solved.result.truth = truth;
     solved.findings = findings::findings(&observations(), Some(&solved.calibration), &FINDINGS);
     solved.result.findings = solved.findings.iter().map(Finding::to_record).collect();
@@ -289,8 +290,8 @@ pub fn with_an_outlier() -> Model {
 pub fn previewed() -> Model {
     let mut model = solved();
     let solved = model.solve.current().expect("solved").clone();
-    for format in export::formats() {
-        let files = export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
+    for format in handeye_export::formats() {
+        let files = handeye_export::preview(*format, &ExportInput::new(&solved.result, &model.export.names));
         let files = files
             .map_err(crate::text::Text::from)
             .map(|files| files.into_iter().map(|file| PreviewFile { name: file.name, text: file.text }).collect());

@@ -12,7 +12,7 @@ use crate::tr;
 pub fn differing(found: &Found) -> Vec<&'static str> {
     let all: Vec<_> = found.hypotheses().iter().map(|h| h.conventions(&found.recording)).collect();
     let Some(first) = all.first() else { return Vec::new() };
-    let value = |of: &[handeye_core::project::import::Convention], key: &str| {
+    let value = |of: &[handeye_import::Convention], key: &str| {
         of.iter().find(|convention| convention.key == key).map(|convention| convention.value.clone())
     };
     let keys = first.iter().map(|convention| convention.key);

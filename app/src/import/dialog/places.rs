@@ -1,7 +1,7 @@
 //! Where a hypothesis has the tip in every view, drawn in the base.
 
 use egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::project::import::Hypothesis;
+use handeye_import::Hypothesis;
 use nalgebra::{Point3, Vector3};
 
 use crate::gui::style::theme::{CAPTION, Palette};

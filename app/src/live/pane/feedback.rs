@@ -6,8 +6,8 @@ use egui::{
     Align, Align2, Color32, CornerRadius, Id, Layout, Rect, RichText, Sense, Spinner, Stroke, StrokeKind, Ui,
     UiBuilder, Vec2, WidgetInfo, WidgetType,
 };
-use handeye_core::capture::Wait;
-use handeye_core::project::session::CaptureId;
+use handeye_capture::Wait;
+use handeye_session::CaptureId;
 
 use super::Shown;
 use crate::capture::rows;

@@ -15,7 +15,7 @@ pub use project::{Projector, board_lines};
 pub use shown::Shown;
 
 use egui::{Align, CornerRadius, Layout, Pos2, Rect, Ui, UiBuilder, Vec2};
-use handeye_core::project::session::CaptureId;
+use handeye_session::CaptureId;
 
 use super::colour_bar;
 use crate::command::Outbox;

@@ -1,11 +1,11 @@
 //! What is drawn over the colour image: corners, axes, the predicted board, coverage, residuals.
 
 use egui::{Color32, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
-use handeye_core::geometry::frames::{Camera, Pose, Target};
-use handeye_core::geometry::statistics::median_high;
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::bent::BoardShape;
-use handeye_core::targets::observation::Corner;
+use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_geometry::statistics::median_high;
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::bent::BoardShape;
+use handeye_geometry::targets::observation::Corner;
 use nalgebra::{Point3, Vector2};
 
 use super::Shown;

@@ -1,9 +1,9 @@
 //! Lines in space as lines in the image, curved where the lens bends them.
 
 use egui::{Pos2, Vec2};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Camera, Pose, Target};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_geometry::targets::TargetSpec;
 use nalgebra::Point3;
 
 use super::place::Place;

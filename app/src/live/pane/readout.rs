@@ -1,7 +1,7 @@
 //! The pixel under the pointer in numbers: colour, depth, and the point in space.
 
 use egui::{CornerRadius, RichText, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, WidgetType};
-use handeye_core::depth::DepthSample;
+use handeye_geometry::depth::DepthSample;
 use nalgebra::{Point3, Vector2};
 
 use super::Shown;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use handeye_core::depth::DepthSample;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::session::CaptureId;
+use handeye_geometry::depth::DepthSample;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_session::CaptureId;
 
 use crate::live::textures::LiveTextures;
 use crate::model::{FrameImages, ImagePoint, Model};

@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
 use egui::{Modifiers, PointerButton, Pos2, Vec2, vec2};
-use handeye_core::capture::Wait;
-use handeye_core::depth::ColourMap;
-use handeye_core::geometry::frames::{Camera, Pose, Target};
-use handeye_core::project::session::CaptureId;
-use handeye_core::verify::Predictor;
+use handeye_capture::Wait;
+use handeye_estimate::verify::Predictor;
+use handeye_geometry::depth::ColourMap;
+use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_session::CaptureId;
 use nalgebra::{Point3, Vector2};
 
 use super::place::Place;

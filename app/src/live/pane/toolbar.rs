@@ -1,7 +1,7 @@
 //! The lines over the images: what is drawn over the colours, and which colours depths have.
 
 use egui::{RichText, Ui};
-use handeye_core::depth::ColourMap;
+use handeye_geometry::depth::ColourMap;
 
 use crate::command::{Command, Outbox};
 use crate::model::{DepthScale, Model};

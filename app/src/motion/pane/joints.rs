@@ -1,7 +1,7 @@
 //! The joints: where each is, where it is sent, and buttons that jog it.
 
 use egui::{Id, RichText, Shape, Slider, Stroke, Ui, WidgetInfo, WidgetType};
-use handeye_core::geometry::arm::{JointKind, JointValues};
+use handeye_arm::{JointKind, JointValues};
 
 use super::blocked::Blocked;
 use super::hold::{self, Hold};

@@ -1,9 +1,9 @@
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::RgbImage;
-use handeye_core::project::session::{Capture, Session, SessionMeta, Store};
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::Pose;
+use handeye_session::{Capture, Session, SessionMeta, Store};
+use image::RgbImage;
 
 use super::*;
 use crate::command::Command;

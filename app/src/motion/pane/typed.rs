@@ -1,8 +1,8 @@
 //! A place to move to, in numbers.
 
 use egui::{Button, DragValue, Grid, Id, RichText, Ui, WidgetInfo, WidgetType};
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::blocked::Blocked;

@@ -1,6 +1,6 @@
 //! Boxes that the arm keeps clear of.
 
-use handeye_core::plan::{Obstacle, Surroundings};
+use handeye_plan::{Obstacle, Surroundings};
 use rerun::{Boxes3D, Quaternion};
 
 use super::error::RecordError;

@@ -1,11 +1,11 @@
 //! The live camera: where it is, what it sees, and the depths of that as points in the base.
 
-use handeye_core::depth::{DepthImage, DepthSample};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use handeye_core::image::{ExtendedColorType, ImageEncoder as _, RgbImage};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::{DepthImage, DepthSample};
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder as _, RgbImage};
 use nalgebra::Vector2;
 use rerun::{Color, EncodedDepthImage, EncodedImage, MediaType, Points3D, Radius};
 

@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::estimate::CornerResidual;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::geometry::planar_pose;
-use handeye_core::image::RgbImage;
-use handeye_core::project::session::{CaptureId, CaptureRecord, Document, Session, SessionError};
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::observation::{Corner, Corners};
+use handeye_estimate::CornerResidual;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::planar_pose;
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::observation::{Corner, Corners};
+use handeye_session::{CaptureId, CaptureRecord, Document, Session, SessionError};
+use image::RgbImage;
 use rerun::{Arrows2D, AsComponents, Color, EncodedImage, Points3D, Radius};
 
 use super::convert::{corner_marks, marks, no_lines, outline, pinhole, pixel, transform};

@@ -1,8 +1,8 @@
 //! From our numbers to those of Rerun.
 
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::observation::Corner;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::observation::Corner;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SymmetricEigen, UnitQuaternion, Vector2, Vector3};
 use rerun::{Color, Ellipsoids3D, LineStrips3D, Pinhole, Points2D, Points3D, Quaternion, Radius, Transform3D};
 use rerun::{FillMode, TransformAxes3D};

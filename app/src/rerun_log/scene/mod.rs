@@ -33,10 +33,10 @@ mod track;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::session::{CaptureId, Document};
+use handeye_arm::{JointKind, JointValues};
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_session::{CaptureId, Document};
 use handeye_sim_link::cell::render::Solid;
 use rerun::{RecordingStream, TextLog, TextLogLevel};
 

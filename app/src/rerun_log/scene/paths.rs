@@ -3,8 +3,8 @@
 //! A transform on an entity is `parent_from_child` along the tree: `base/tip` holds `base_from_tip`. Everything with a
 //! pose is below [`BASE`] or [`TRUTH`], both of which coincide with the root.
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::project::session::CaptureId;
+use handeye_estimate::handeye::Mode;
+use handeye_session::CaptureId;
 
 /// Number of the newest capture: how many were taken up to then. What happens between two captures has no time here.
 pub const CAPTURE_TIMELINE: &str = "capture";

@@ -1,6 +1,6 @@
 //! Writes archetypes at a time.
 
-use handeye_core::geometry::frames::Pose;
+use handeye_geometry::frames::Pose;
 use nalgebra::Isometry3;
 use rerun::{AsComponents, RecordingStream};
 

@@ -1,6 +1,6 @@
 //! Poses that guided capture goes to: a frustum where the camera will be, or an outline where the board on the tip will be.
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::Isometry3;
 use rerun::{AsComponents, LineStrips3D, Radius};
 

@@ -1,6 +1,6 @@
 //! The arm, its joints, and the way that the tip went.
 
-use handeye_core::geometry::arm::JointKind;
+use handeye_arm::JointKind;
 use handeye_sim_link::cell::render::{Shape, Solid};
 use nalgebra::Vector3;
 use rerun::{Capsules3D, Color, Cylinders3D, FillMode, LineStrips3D, Radius, Scalars, SeriesLines};

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use handeye_core::plan::{Obstacle, Surroundings};
-use handeye_core::project::session::{CaptureId, Document};
-use handeye_core::track::{Estimate, State, Update};
+use handeye_plan::{Obstacle, Surroundings};
+use handeye_session::{CaptureId, Document};
+use handeye_track::{Estimate, State, Update};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use rerun::RecordingStreamBuilder;
 use rerun::log::{Chunk, LogMsg};

@@ -1,6 +1,6 @@
 //! The board as it is tracked.
 
-use handeye_core::geometry::point_error;
+use handeye_geometry::point_error;
 use rerun::{Points3D, Radius};
 
 use super::camera::lens;

@@ -1,8 +1,8 @@
 //! Boards in three dimensions.
 
 use egui::{Color32, Stroke};
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::targets::{AprilGrid, Layout, TargetSpec};
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_geometry::targets::{AprilGrid, Layout, TargetSpec};
 use nalgebra::{Point3, Vector2, Vector3};
 
 use super::canvas::Canvas;
@@ -113,7 +113,7 @@ pub fn outlined(
 
 #[cfg(test)]
 mod tests {
-    use handeye_core::targets::Grid;
+    use handeye_geometry::targets::Grid;
 
     use super::*;
 

@@ -1,7 +1,7 @@
 //! Boxes that the arm keeps out of: those of a person, and those that the cell says stand around.
 
 use egui::{Color32, Stroke};
-use handeye_core::plan::{Obstacle, WorkVolume};
+use handeye_plan::{Obstacle, WorkVolume};
 use nalgebra::Point3;
 
 use super::canvas::Canvas;

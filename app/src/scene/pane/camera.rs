@@ -1,8 +1,8 @@
 //! Cameras as the pyramids that they see.
 
 use egui::{Color32, Stroke};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose};
 use nalgebra::Point3;
 
 use super::canvas::Canvas;

@@ -1,8 +1,8 @@
 //! The captures in three dimensions: from where each was taken, in the colour of its residual.
 
 use egui::{Color32, Pos2, Stroke};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::session::CaptureId;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_session::CaptureId;
 use nalgebra::Point3;
 
 use super::board::{self, Line};

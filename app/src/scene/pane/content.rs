@@ -1,8 +1,8 @@
 //! What there is to see in the cell, and what of it is known how.
 
 use egui::{Color32, Stroke, Ui};
-use handeye_core::geometry::frames::Pose;
-use handeye_core::project::session::CaptureId;
+use handeye_geometry::frames::Pose;
+use handeye_session::CaptureId;
 use nalgebra::Point3;
 
 use super::arm;

@@ -19,7 +19,7 @@ use egui::{
     Align, CornerRadius, FontId, Layout, PointerButton, Pos2, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2,
 };
 use egui::{WidgetInfo, WidgetType};
-use handeye_core::project::session::CaptureId;
+use handeye_session::CaptureId;
 
 use crate::capture::rows as tables;
 use crate::capture::rows::CaptureTable;

@@ -1,7 +1,7 @@
 //! Poses that guided capture has planned: where the camera, or the board, will be.
 
 use egui::Color32;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::board::{self, Line};
 use super::camera::Frustum;

@@ -1,6 +1,6 @@
 use egui::{Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::plan::surroundings::{KeepOutBox, KeepOutFile};
+use handeye_plan::surroundings::{KeepOutBox, KeepOutFile};
 
 use super::*;
 use crate::gui::testing::pane_harness::PaneHarness;
@@ -224,7 +224,7 @@ fn numbers_that_are_not_finite_are_not_drawn() {
     let mut model = sample::tracking();
     if let Some(robot) = &mut model.robot {
         robot.base_from_tip =
-            handeye_core::geometry::frames::Pose::from_translation_xyzw([f64::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
+            handeye_geometry::frames::Pose::from_translation_xyzw([f64::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
         robot.joints_rad[2] = f64::NAN;
     }
     model.scene.distance_m = 0.08;

@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 use std::time::SystemTime;
 
-use handeye_core::project::session::JOURNAL;
+use handeye_session::JOURNAL;
 
 use crate::model::exports_of;
 

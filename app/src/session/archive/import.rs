@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use handeye_core::project::dataset::{DESCRIPTION, Dataset};
-use handeye_core::project::files::atomic_file;
-use handeye_core::project::files::bounds::Bounds;
-use handeye_core::project::session::{Capture, Document, Role, Store};
+use handeye_dataset::{DESCRIPTION, Dataset};
+use handeye_files::atomic_file;
+use handeye_files::bounds::Bounds;
+use handeye_session::{Capture, Document, Role, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
 use crate::command::Event;
@@ -174,7 +174,7 @@ mod tests {
         let (upload, sessions) = (home.path().join("uploads/1"), home.path().join("sessions"));
         let private = home.path().join("private.png");
         fs::create_dir_all(&upload).expect("made");
-        handeye_core::image::RgbImage::new(64, 48).save(&private).expect("saved");
+        image::RgbImage::new(64, 48).save(&private).expect("saved");
         std::os::unix::fs::symlink(&private, upload.join("linked.png")).expect("linked");
         let described = "mode = \"eye_in_hand\"\n\
             [target]\nkind = \"chessboard\"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n\

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crossbeam_channel::{Receiver, select};
-use handeye_core::plan::guided::record::{GUIDED_RECORD, GuidedRecord};
-use handeye_core::project::files::bounds::Bounds;
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::{Document, Edit, SessionError, SessionMeta, Store};
-use handeye_core::project::taught_poses::TaughtPose;
+use handeye_dataset::taught_poses::TaughtPose;
+use handeye_files::bounds::Bounds;
+use handeye_result::CalibrationResult;
+use handeye_result::guided_record::{GUIDED_RECORD, GuidedRecord};
+use handeye_session::{Document, Edit, SessionError, SessionMeta, Store};
 
 use crate::capture::Measured;
 use crate::command::Event;

@@ -1,8 +1,8 @@
 //! The expected error by number of poses: how it fell, how it will fall, and where the goal is.
 
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, WidgetInfo, WidgetType};
-use handeye_core::estimate::claim::Claim;
-use handeye_core::estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
+use handeye_estimate::claim::Claim;
+use handeye_estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
 
 use super::axes::{self, Scale};
 use super::instead_ui;

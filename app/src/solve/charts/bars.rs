@@ -2,8 +2,8 @@
 
 use egui::{Align, Align2, Color32, CursorIcon, FontId, Layout, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2};
 use egui::{UiBuilder, WidgetInfo, WidgetType};
-use handeye_core::geometry::statistics::median_high;
-use handeye_core::project::session::CaptureId;
+use handeye_geometry::statistics::median_high;
+use handeye_session::CaptureId;
 
 use super::axes::{self, Scale};
 use super::{instead_ui, legend};

@@ -1,6 +1,6 @@
 use egui::vec2;
-use handeye_core::estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
-use handeye_core::project::session::CaptureId;
+use handeye_estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
+use handeye_session::CaptureId;
 
 use super::*;
 use crate::command::Command;

@@ -1,9 +1,9 @@
 //! Where the camera is, how far off that may be, and how far off it is where the truth is known.
 
 use egui::{RichText, Ui};
-use handeye_core::estimate::claim::Claim;
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::handeye::joint::SmallSample;
+use handeye_estimate::claim::Claim;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::handeye::joint::SmallSample;
 
 use super::figures::{self, Within95};
 use crate::gui::style::numbers;

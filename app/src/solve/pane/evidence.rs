@@ -1,7 +1,7 @@
 //! The numbers behind a finding in one line.
 
-use handeye_core::diagnose::findings::{Evidence, Finding};
-use handeye_core::wording::decimals;
+use handeye_estimate::diagnose::findings::{Evidence, Finding};
+use handeye_wording::decimals;
 
 use crate::gui::style::numbers;
 use crate::text::Language;

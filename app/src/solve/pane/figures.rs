@@ -1,11 +1,11 @@
 //! Numbers of the pane that the result does not hold itself.
 
-use handeye_core::estimate::claim::Claim;
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::estimate::handeye::joint::SmallSample;
-use handeye_core::geometry::frames::{Camera, Mount, Pose};
-use handeye_core::geometry::point_error;
-use handeye_core::geometry::se3;
+use handeye_estimate::claim::Claim;
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::handeye::joint::SmallSample;
+use handeye_geometry::frames::{Camera, Mount, Pose};
+use handeye_geometry::point_error;
+use handeye_geometry::se3;
 use nalgebra::{Cholesky, Matrix3, Matrix6, Vector3};
 
 use crate::model::{Model, Solved};

@@ -1,7 +1,7 @@
 //! What is weak, by which evidence, and what to do next.
 
 use egui::{Label, RichText, Ui};
-use handeye_core::diagnose::findings::{Finding, Severity};
+use handeye_estimate::diagnose::findings::{Finding, Severity};
 
 use super::evidence;
 use crate::gui::style::parts;

@@ -1,8 +1,8 @@
 //! The answers of the closed forms beside the one that is asked for.
 
 use egui::{Grid, RichText, Ui};
-use handeye_core::estimate::Method;
-use handeye_core::geometry::frames::{Camera, Mount, Pose};
+use handeye_estimate::Method;
+use handeye_geometry::frames::{Camera, Mount, Pose};
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;

@@ -1,7 +1,7 @@
 //! The camera, the noise levels, and residuals, which are called what they are.
 
 use egui::Ui;
-use handeye_core::estimate::resolution::{angle_said, place_said};
+use handeye_estimate::resolution::{angle_said, place_said};
 
 use crate::gui::style::numbers;
 use crate::gui::style::parts;

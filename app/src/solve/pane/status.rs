@@ -1,8 +1,8 @@
 //! What the solver does, and what to do when it has no answer.
 
 use egui::{Button, RichText, Ui};
-use handeye_core::estimate::handeye::motion::MIN_VIEWS;
-use handeye_core::progress::Stage;
+use handeye_estimate::handeye::motion::MIN_VIEWS;
+use handeye_geometry::progress::Stage;
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;

@@ -1,14 +1,14 @@
-use handeye_core::diagnose::doctor;
-use handeye_core::diagnose::findings::{self, FindingCode, FindingOptions};
-use handeye_core::estimate::claim::Claim;
-use handeye_core::estimate::handeye::screening::Distance;
-use handeye_core::estimate::handeye::{HandEyeError, Mode};
-use handeye_core::estimate::uncertainty::widening::{Evidence, Widening};
-use handeye_core::estimate::{CameraKnowledge, Observations, ObservedView, ShapeEstimate, ViewStatus};
-use handeye_core::geometry::frames::Pose;
-use handeye_core::progress::{CancelToken, Stage};
-use handeye_core::project::result::TruthComparison;
-use handeye_core::targets::bent::BoardShape;
+use handeye_estimate::claim::Claim;
+use handeye_estimate::diagnose::doctor;
+use handeye_estimate::diagnose::findings::{self, FindingCode, FindingOptions};
+use handeye_estimate::handeye::screening::Distance;
+use handeye_estimate::handeye::{HandEyeError, Mode};
+use handeye_estimate::uncertainty::widening::{Evidence, Widening};
+use handeye_estimate::{CameraKnowledge, Observations, ObservedView, ShapeEstimate, ViewStatus};
+use handeye_geometry::frames::Pose;
+use handeye_geometry::progress::{CancelToken, Stage};
+use handeye_geometry::targets::bent::BoardShape;
+use handeye_result::TruthComparison;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -166,7 +166,7 @@ fn keeping_all_views_is_one_click() {
 }
 
 /// What the estimate found out, all of it.
-fn with_everything_found(calibration: &mut handeye_core::diagnose::Calibration) {
+fn with_everything_found(calibration: &mut handeye_estimate::diagnose::Calibration) {
     for view in calibration.views.iter_mut().take(2) {
         view.status = ViewStatus::Outlier;
         view.distance = Some(Distance { of_limit: 4.0, metres: 8e-3, radians: 0.02 });
@@ -217,7 +217,7 @@ fn what_the_estimate_found_out_is_stated_with_units() {
 fn a_camera_beside_the_robot_is_shown_in_the_base() {
     let model = sample::with_answer(|solved| {
         let hand_eye = solved.calibration.hand_eye.expect("a hand-eye");
-        solved.calibration.hand_eye = Some(handeye_core::estimate::handeye::HandEye::new(
+        solved.calibration.hand_eye = Some(handeye_estimate::handeye::HandEye::new(
             Mode::EyeToHand,
             hand_eye.mount_from_camera(),
             hand_eye.anchor_from_target(),
@@ -247,7 +247,9 @@ fn every_finding() -> Vec<findings::Finding> {
     let good = observations(&model);
     let calibration = model.solve.current().expect("solved").calibration.clone();
     let mut found = Vec::new();
-    let mut judge = |observations: &Observations, change: &dyn Fn(&mut handeye_core::diagnose::Calibration), goal| {
+    let mut judge = |observations: &Observations,
+                     change: &dyn Fn(&mut handeye_estimate::diagnose::Calibration),
+                     goal| {
         let mut calibration = calibration.clone();
         change(&mut calibration);
         found.extend(findings::findings(observations, Some(&calibration), &FindingOptions::with_goal_mm(Some(goal))));

@@ -2,7 +2,7 @@
 
 use egui::{Align, Color32, Id, Key, Layout, Rect, RichText, Sense, Stroke, TextEdit, Ui, Vec2};
 use egui::{WidgetInfo, WidgetType};
-use handeye_core::project::taught_poses::{Goal, TaughtPose};
+use handeye_dataset::taught_poses::{Goal, TaughtPose};
 
 use super::immovable;
 use crate::command::{Command, Outbox};

@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use egui::Key;
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::project::taught_poses::{Goal, TaughtPose};
+use handeye_dataset::taught_poses::{Goal, TaughtPose};
+use handeye_geometry::frames::Pose;
 
 use super::*;
 use crate::command::Command;

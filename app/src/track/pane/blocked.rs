@@ -1,7 +1,7 @@
 //! Why the board cannot be tracked or followed now.
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::track::State;
+use handeye_estimate::handeye::Mode;
+use handeye_track::State;
 
 use crate::model::{FollowStatus, Model, Motion, Simulation};
 use crate::tr;

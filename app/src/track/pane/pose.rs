@@ -1,8 +1,8 @@
 //! Where the tracked board is in the base, by all images and by the newest alone.
 
 use egui::Ui;
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::track::{Estimate, Update};
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_track::{Estimate, Update};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::gui::style::numbers;

@@ -1,7 +1,7 @@
 //! Whether the board is followed, in a colour and in words.
 
 use egui::{RichText, Ui};
-use handeye_core::track::State;
+use handeye_track::State;
 
 use crate::gui::status::STALE_AFTER_S;
 use crate::gui::style::parts;

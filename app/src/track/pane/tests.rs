@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
 use egui_kittest::kittest::Queryable as _;
-use handeye_core::estimate::handeye::HandEye;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::track::State;
+use handeye_estimate::handeye::HandEye;
+use handeye_geometry::frames::Pose;
+use handeye_track::State;
 
 use super::*;
 use crate::gui::testing::driven::Driven;

@@ -1,8 +1,8 @@
 //! Every capture on its own.
 
 use egui::{Grid, RichText, Ui};
-use handeye_core::project::session::CaptureId;
-use handeye_core::verify::{CaptureCheck, Verification};
+use handeye_estimate::verify::{CaptureCheck, Verification};
+use handeye_session::CaptureId;
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::numbers;

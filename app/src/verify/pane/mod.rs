@@ -6,7 +6,7 @@ mod planned;
 mod summary;
 
 use egui::{Button, Ui};
-use handeye_core::project::session::Role;
+use handeye_session::Role;
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;

@@ -1,8 +1,8 @@
 //! A point of the image in the base, measured in two ways.
 
 use egui::Ui;
-use handeye_core::estimate::claim::Claim;
-use handeye_core::verify::MeasuredPoint;
+use handeye_estimate::claim::Claim;
+use handeye_estimate::verify::MeasuredPoint;
 use nalgebra::Vector3;
 
 use crate::command::{Command, Outbox};

@@ -1,7 +1,7 @@
 //! Captures for verification at poses that the program plans, visits and captures at by itself.
 
 use egui::{Button, Spinner, Ui};
-use handeye_core::estimate::handeye::Mode;
+use handeye_estimate::handeye::Mode;
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;

@@ -1,7 +1,7 @@
 //! All captures together.
 
 use egui::{Label, RichText, Ui};
-use handeye_core::verify::Verification;
+use handeye_estimate::verify::Verification;
 
 use crate::gui::style::parts;
 use crate::gui::style::theme::Palette;

@@ -1,6 +1,6 @@
-use handeye_core::capture::Wait;
-use handeye_core::project::session::{CaptureId, Role};
-use handeye_core::verify::VerifyError;
+use handeye_capture::Wait;
+use handeye_estimate::verify::VerifyError;
+use handeye_session::{CaptureId, Role};
 use nalgebra::Vector2;
 use std::sync::Arc;
 

@@ -4,15 +4,15 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded, select};
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
-use handeye_core::image::RgbImage;
-use handeye_core::targets::observation::{Corner, Corners};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::{Base, Pose, Target, Tip};
+use handeye_geometry::targets::observation::{Corner, Corners};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions};
+use image::RgbImage;
 
 use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
 use super::{LatestSlot, Outlet, Tap, Vision, VisionSlots, VisionTask};

@@ -11,12 +11,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, SendTimeoutError, Sender, TryRecvError, never, select};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::image::GrayImage;
-use handeye_core::project::files::image_file::gray_from_rgb;
-use handeye_core::targets::TargetSpec;
-use handeye_core::track::{Image, Setup};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::targets::TargetSpec;
+use handeye_images::gray_from_rgb;
 use handeye_sim_link::client::CancelToken;
+use handeye_track::{Image, Setup};
+use image::GrayImage;
 
 use search::Search;
 

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use handeye_core::detect::{DetectOptions, detect_with};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::planar_pose;
-use handeye_core::image::GrayImage;
-use handeye_core::progress::CancelToken;
-use handeye_core::targets::TargetSpec;
+use handeye_detect::{DetectOptions, detect_with};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::planar_pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use image::GrayImage;
 
 use crate::model::{LiveDetection, LiveFrame};
 

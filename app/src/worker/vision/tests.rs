@@ -1,12 +1,13 @@
-use handeye_core::capture::NO_IMAGES_S;
-use handeye_core::capture::Wait;
-use handeye_core::detect::VisionError;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::Pose;
-use handeye_core::image::{Rgb, RgbImage};
-use handeye_core::progress::CancelToken;
-use handeye_core::targets::{Grid, TargetSpec};
-use handeye_core::testing::{Scene, looking_at_point};
+use handeye_capture::NO_IMAGES_S;
+use handeye_capture::Wait;
+use handeye_detect::VisionError;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::Pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_geometry::testing::looking_at_point;
+use handeye_simulate::Scene;
+use image::{Rgb, RgbImage};
 use nalgebra::Vector2;
 
 use super::VisionTask;
@@ -94,7 +95,7 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
     assert_eq!(measured.thumbnail.dimensions(), (160, 120));
     assert_eq!(*measured.rgb, board(1), "nothing is drawn on it");
     assert_eq!(measured.pose_name.as_deref(), Some("view"));
-    let again = handeye_core::capture::observe_image(&measured.rgb, &BOARD, &CancelToken::default())
+    let again = handeye_detect::observe_image(&measured.rgb, &BOARD, &CancelToken::default())
         .expect("searches")
         .expect("the board");
     assert_eq!(again.corners, measured.corners, "the kept image gives the same corners");

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3, Vector3, Vector4};
 
 use super::{JointMotion, MotionError, MotionLimits, MotionState, MotionStep, Sync};
-use handeye_core::geometry::se3::rotation_vector;
+use handeye_geometry::se3::rotation_vector;
 
 /// A planned move of a pose.
 ///

@@ -3,14 +3,14 @@
 use std::fmt;
 use std::str::FromStr;
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Translation3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::Moment;
 use crate::cell::scene::Scene;
-use handeye_core::geometry::arm::{ArmError, JointValues, MAX_JOINTS};
+use handeye_arm::{ArmError, JointValues, MAX_JOINTS};
 
 /// Random numbers of a fault, apart from those of scene and corners.
 const FAULT_STREAM: u64 = 4;

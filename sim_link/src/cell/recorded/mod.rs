@@ -9,20 +9,21 @@ mod fault;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use handeye_core::estimate::handeye::Mode;
-use handeye_core::geometry::arm::{ArmError, ArmModel, JointValues, JointView, place_checked};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::dataset::write::Joints;
-use handeye_core::project::dataset::{self, CameraInput, write};
-use handeye_core::targets::TargetSpec;
-use handeye_core::targets::observation::{Corner, View};
+use handeye_arm::{ArmError, ArmModel, JointValues};
+use handeye_dataset::write::Joints;
+use handeye_dataset::{self as dataset, CameraInput, write};
+use handeye_estimate::handeye::Mode;
+use handeye_estimate::placement::{JointView, PlacementError, place_checked};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::observation::{Corner, View};
 use nalgebra::{Point3, Vector2};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::scene::{ResolvedScene, Scene, SceneError};
-use handeye_core::plan::{PlanError, PlannedView, ViewOptions, ViewSetup, random_poses_looking_at};
+use handeye_plan::{PlanError, PlannedView, ViewOptions, ViewSetup, random_poses_looking_at};
 
 pub use fault::{Fault, UnknownFault};
 
@@ -201,8 +202,8 @@ impl RecordedSession {
     /// The views as an estimator takes them, with how the tip moves with each joint.
     ///
     /// # Errors
-    /// [`ArmError`] when the record's poses and joint angles do not fit each other, as with poses turned over.
-    pub fn views(&self) -> Result<Vec<View>, ArmError> {
+    /// [`PlacementError`] when the record's poses and joint angles do not fit each other, as with poses turned over.
+    pub fn views(&self) -> Result<Vec<View>, PlacementError> {
         let joint_views: Vec<JointView<'_>> = self
             .views
             .iter()

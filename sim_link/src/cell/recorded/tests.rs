@@ -1,7 +1,8 @@
 use super::*;
-use handeye_core::geometry::arm::{ArmError, ArmKind, place};
-use handeye_core::geometry::se3;
-use handeye_core::project::dataset::Dataset;
+use handeye_arm::ArmKind;
+use handeye_dataset::Dataset;
+use handeye_estimate::placement::{PlacementError, place};
+use handeye_geometry::se3;
 use nalgebra::Vector6;
 
 fn session(seed: u64, fault: Option<Fault>) -> RecordedSession {
@@ -128,7 +129,7 @@ fn turning_the_reported_tip_by_the_twists_explains_joint_offsets() {
 #[test]
 fn poses_written_wrongly_do_not_fit_the_joint_values() {
     for fault in [Fault::PosesInverted, Fault::Millimetres] {
-        assert!(matches!(session(1, Some(fault)).views(), Err(ArmError::Foreign { .. })), "{fault}");
+        assert!(matches!(session(1, Some(fault)).views(), Err(PlacementError::Foreign { .. })), "{fault}");
     }
     for fault in [None, Some(Fault::STUDIED[2])] {
         let session = session(1, fault);

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use handeye_core::image::RgbImage;
+use image::RgbImage;
 
 use super::Imaging;
 

@@ -1,6 +1,6 @@
 //! Images of the cell: RGB and registered depth, computed on one CPU core without a graphics card.
 //!
-//! The lens is exact for every model of [`handeye_core::geometry::camera`], and so is the anti-aliasing of the board: a pixel
+//! The lens is exact for every model of [`handeye_geometry::camera`], and so is the anti-aliasing of the board: a pixel
 //! holds the integral of the printed pattern over its own area, so that a corner detector meets the truth and not
 //! the artefacts of a sampler. [`Sampling::Centre`] has those artefacts: it is what CoppeliaSim's vision sensors do.
 //! Every image is a function of its arguments alone, seed included.
@@ -23,7 +23,7 @@ mod texture;
 
 use std::sync::Arc;
 
-use handeye_core::image::RgbImage;
+use image::RgbImage;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 

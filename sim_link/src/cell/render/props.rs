@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Finish, Shape, Solid};
 use crate::cell::scene::ArmSpec;
-use handeye_core::geometry::arm::{Arm, ArmKind};
-use handeye_core::plan::links;
+use handeye_arm::{Arm, ArmKind};
+use handeye_plan::links;
 
 /// Turned aluminium of tubes and housings.
 pub const ALUMINIUM: [f32; 3] = [0.76, 0.78, 0.80];

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::camera::{Distortion, Intrinsics};
 use nalgebra::{Point3, Vector2};
 
 use super::shapes::{Rays, Vec3};

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::image::RgbImage;
+use handeye_geometry::camera::Intrinsics;
+use image::RgbImage;
 
 use super::rays::{Ray, RayTable, Tile};
 use super::stage::{BACKGROUND, Hit, Stage, TileContent};

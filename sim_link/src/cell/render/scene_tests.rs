@@ -1,6 +1,6 @@
 //! Bodies, order of depth, clipping, edges, and images as values.
 
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::camera::{Distortion, Intrinsics};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -289,7 +289,7 @@ fn a_body_darkens_the_floor_below_it_and_leaves_the_print_alone() {
     let (with, without) = (render(true), render(false));
     let camera = small_camera();
     let below = camera.project(&Point3::new(0.1, 0.3, 1.0)).expect("in front");
-    let at = |image: &handeye_core::image::RgbImage| image.get_pixel(below.x as u32, below.y as u32).0[0];
+    let at = |image: &image::RgbImage| image.get_pixel(below.x as u32, below.y as u32).0[0];
     assert!(f32::from(at(&with)) < 0.75 * f32::from(at(&without)), "{} {}", at(&with), at(&without));
 
     let facing = LightSource::Directional(Unit::new_normalize(Vector3::new(0.0, -0.2, -1.0)));

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::image::RgbImage;
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use image::RgbImage;
 use nalgebra::{Isometry3, Matrix2, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::geometry::arm::urdf::{Urdf, UrdfError};
-use handeye_core::geometry::arm::{Arm, ArmKind};
+use handeye_arm::urdf::{Urdf, UrdfError};
+use handeye_arm::{Arm, ArmKind};
 use serde::{Deserialize, Serialize};
 
 /// The arm of a scene: `"ur5e"`, or `{ urdf = "panda.urdf", base = "panda_link0", tip = "panda_link8" }`.

@@ -1,7 +1,7 @@
 //! Ranges of the numbers in a scene file.
 
-use handeye_core::geometry::arm::{Arm, JointKind, JointRange, JointValues};
-use handeye_core::geometry::camera::Intrinsics;
+use handeye_arm::{Arm, JointKind, JointRange, JointValues};
+use handeye_geometry::camera::Intrinsics;
 use nalgebra::Vector2;
 
 use super::Scene;

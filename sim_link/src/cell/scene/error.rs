@@ -1,13 +1,13 @@
 //! What can be wrong with a scene file.
 
-use handeye_core::geometry::arm::urdf::UrdfError;
+use handeye_arm::urdf::UrdfError;
 
 use super::{ShippedScene, locate};
-use handeye_core::text;
-use handeye_core::wording::Text;
+use handeye_wording::Text;
+use handeye_wording::text;
 
 /// Why a scene cannot be used.
-#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.

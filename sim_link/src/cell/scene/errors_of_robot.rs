@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::RobotSpec;
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
 
 /// First stream of random numbers that belongs to settled positions; the ones below are the scene's own.
 const FIRST_STREAM: u64 = 1 << 32;

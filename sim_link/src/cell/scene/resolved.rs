@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use crate::axes::{sensor_from_camera, sheet_from_target};
 use crate::cell::render::{BoardSurface, Imaging, Light, LightSource, PrintErrors};
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
+use handeye_geometry::targets::{Grid, TargetSpec};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::Scene;
@@ -19,8 +19,8 @@ use super::spec::{
     CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, REFERENCE_VIEW_ANGLE_DEG, RelativeTo, SimulationSpec,
     SlipSpec, SolidSpec,
 };
-use handeye_core::geometry::arm::{Arm, ArmError, JointValues};
-use handeye_core::geometry::se3;
+use handeye_arm::{Arm, ArmError, JointValues};
+use handeye_geometry::se3;
 
 const CAMERA_STREAM: u64 = 1;
 const BOARD_STREAM: u64 = 2;
@@ -182,7 +182,7 @@ pub(super) fn resolve(scene: &Scene, arm: Arm, seed: u64) -> ResolvedScene {
     let Scene { seed: _, simulation, robot, camera, board, image, depth, light, solids } = scene;
     let tip_from_camera = camera_on_tip(camera, seed);
     let world_from_plane = board.plane.isometry()
-        * handeye_core::geometry::se3::exp(&gaussian(
+        * handeye_geometry::se3::exp(&gaussian(
             seed,
             BOARD_STREAM,
             board.random_offset_mm * 1e-3,

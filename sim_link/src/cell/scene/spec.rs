@@ -1,13 +1,13 @@
 //! What can be written into a scene file, with the defaults of the reference scene.
 
-use handeye_core::geometry::camera::Distortion;
+use handeye_geometry::camera::Distortion;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::arm::ArmSpec;
 use super::board_motion::BoardMotionSpec;
 use crate::cell::render::Sampling;
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
 
 /// cos 45° = sin 45°, for quaternions of quarter and half turns.
 const HALF_SQRT: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -1,9 +1,9 @@
 use super::*;
 use crate::axes::sensor_from_camera;
 use crate::cell::motion::Course;
-use handeye_core::geometry::arm::{ArmKind, JointValues};
-use handeye_core::geometry::frames::{Base, PointIn, Pose, Tip};
-use handeye_core::plan::ViewSetup;
+use handeye_arm::{ArmKind, JointValues};
+use handeye_geometry::frames::{Base, PointIn, Pose, Tip};
+use handeye_plan::ViewSetup;
 use nalgebra::{Point3, Vector2, Vector3};
 
 /// World poses of the tip that the public script drives to, `[x y z qx qy qz qw]`; it lists one of them twice.
@@ -200,7 +200,7 @@ fn a_seed_decides_everything_and_another_one_changes_everything() {
 fn the_truth_of_a_seed_is_pinned() {
     let camera = Scene::realistic().unwrap().resolve(1).unwrap().tip_from_camera;
     let nominal = reference().tip_from_camera;
-    let delta = handeye_core::geometry::se3::log((nominal.inverse() * camera).isometry());
+    let delta = handeye_geometry::se3::log((nominal.inverse() * camera).isometry());
     let pinned = [
         0.0007908064455675657,
         -0.004154311114395666,

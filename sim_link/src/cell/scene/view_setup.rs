@@ -1,7 +1,7 @@
 //! What the planner of views has to know, of a simulated cell.
 
-use handeye_core::geometry::arm::ArmKind;
-use handeye_core::plan::{Arm, ArmBody, Carried, Obstacle, Surroundings, ViewSetup};
+use handeye_arm::ArmKind;
+use handeye_plan::{Arm, ArmBody, Carried, Obstacle, Surroundings, ViewSetup};
 use nalgebra::Translation3;
 
 use super::ResolvedScene;

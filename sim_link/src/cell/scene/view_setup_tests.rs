@@ -1,11 +1,11 @@
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::{PlanError, PlannedView, ViewOptions, order_by_travel, poses_looking_at, travel};
+use handeye_arm::JointValues;
+use handeye_plan::{PlanError, PlannedView, ViewOptions, order_by_travel, poses_looking_at, travel};
 use nalgebra::{Isometry3, Point3};
 
 use super::*;
 use crate::cell::motion::{JointMotion, MotionLimits, MotionState, Sync};
 use crate::cell::scene::Scene;
-use handeye_core::geometry::frames::PointIn;
+use handeye_geometry::frames::PointIn;
 
 fn setup(scene: &Scene) -> ViewSetup {
     ViewSetup::from(&scene.resolve(scene.seed).unwrap())

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use handeye_core::geometry::camera::Intrinsics;
+use handeye_geometry::camera::Intrinsics;
 use nalgebra::Isometry3;
 
 use super::message;

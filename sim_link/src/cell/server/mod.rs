@@ -71,7 +71,7 @@ impl CellConfig {
 }
 
 /// Why a cell cannot be served.
-#[derive(Debug, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum CellError {
     /// The scene is not usable.

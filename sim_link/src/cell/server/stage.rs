@@ -8,7 +8,7 @@ use crate::cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, RobotErrors, 
 use crate::cell::world::{
     Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError, turn_z,
 };
-use handeye_core::geometry::arm::{Arm, JointValues};
+use handeye_arm::{Arm, JointValues};
 
 /// Handles of the objects that the cell itself has to find again.
 #[derive(Debug, Clone)]
@@ -216,7 +216,7 @@ impl Faults for CellFaults {
             }
         }
         if let Ok(tip) = tree.get_mut(self.tip) {
-            tip.displacement = handeye_core::geometry::se3::exp(&self.errors.settled(self.settled));
+            tip.displacement = handeye_geometry::se3::exp(&self.errors.settled(self.settled));
         }
         self.let_slip(tree);
     }

@@ -4,7 +4,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use handeye_core::geometry::arm::{JointKind, JointRange};
+use handeye_arm::{JointKind, JointRange};
 use nalgebra::{Isometry3, Translation3};
 
 use super::error::WorldError;

@@ -181,7 +181,7 @@ pub fn euler_from_rotation(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
 /// The pose a part of the way from one to another: position on the line, rotation about one axis, the short way.
 pub fn interpolate(from: &Isometry3<f64>, to: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
     let position = from.translation.vector.lerp(&to.translation.vector, t);
-    let turn = handeye_core::geometry::se3::rotation_vector(&(from.rotation.inverse() * to.rotation));
+    let turn = handeye_geometry::se3::rotation_vector(&(from.rotation.inverse() * to.rotation));
     Isometry3::from_parts(Translation3::from(position), from.rotation * UnitQuaternion::from_scaled_axis(turn * t))
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use handeye_core::geometry::camera::Intrinsics;
+use handeye_geometry::camera::Intrinsics;
 use nalgebra::Isometry3;
 
 use crate::cell::world::handle::Handle;

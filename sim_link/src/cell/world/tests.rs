@@ -1,4 +1,4 @@
-use handeye_core::geometry::camera::Intrinsics;
+use handeye_geometry::camera::Intrinsics;
 
 use super::*;
 

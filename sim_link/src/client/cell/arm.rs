@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::progress::CancelToken;
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
 
 use super::joint_elsewhere::joint_elsewhere;
 use super::joints::{largest_change, of_rad, read_joint_values};

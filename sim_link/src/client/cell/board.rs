@@ -1,8 +1,8 @@
 //! The board: where a scene has it; moving and hiding that of the built-in cell.
 
 use ciborium::Value;
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::targets::TargetSpec;
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_geometry::targets::TargetSpec;
 
 use super::Arm;
 use crate::axes::sheet_from_target;

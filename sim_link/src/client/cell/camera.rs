@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Pose, Target, Tip};
-use handeye_core::image::RgbImage;
+use handeye_arm::JointValues;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use handeye_geometry::frames::{Base, Pose, Target, Tip};
+use image::RgbImage;
 
 use super::hold::Held;
 use super::joints::read_joint_values;

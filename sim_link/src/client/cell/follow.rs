@@ -5,8 +5,8 @@
 //! passes between; it still moves by one step of one pass then, because the way of several in one would be wild, and
 //! after a longer pause it starts anew from rest.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::follow_goal::{FollowEnd, FollowGoal, FollowLimits, positive};
 use super::follow_plan::FollowPlan;

@@ -1,7 +1,7 @@
 //! Where an arm that follows is sent, within which limits, and how it ends.
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::SpeedLimits;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_plan::SpeedLimits;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::client::error::LinkError;

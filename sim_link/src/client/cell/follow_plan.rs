@@ -7,10 +7,10 @@
 //!
 //! What the arm must not touch does not end it: it goes by, as near to its goal as it can, or stands and goes on when the goal does.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::geometry::se3::rotation_vector;
-use handeye_core::plan::Guard;
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::se3::rotation_vector;
+use handeye_plan::Guard;
 use nalgebra::{Isometry3, Vector3};
 
 use super::follow_goal::{FollowEnd, FollowGoal, FollowLimits, moved};

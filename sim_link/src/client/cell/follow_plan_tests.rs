@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use super::super::follow_goal::Workspace;
 use super::super::surroundings::Among;
 use super::*;
-use handeye_core::geometry::arm::{ArmKind, JointRange};
-use handeye_core::plan as planning;
+use handeye_arm::{ArmKind, JointRange};
+use handeye_plan as planning;
 
 const DT_S: f64 = 0.05;
 

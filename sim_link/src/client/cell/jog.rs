@@ -3,8 +3,8 @@
 //! The next point is computed here and sent for one pass of the simulation, so the arm stands within a pass when this
 //! client hangs, dies, or loses its connection. As long as it lives, it comes to rest within the limits of acceleration.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Camera, Pose, Tip};
 use nalgebra::Vector3;
 
 use super::jog_plan::{JogObstacle, JogPlan, Path, Watch};

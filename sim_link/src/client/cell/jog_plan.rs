@@ -1,10 +1,10 @@
 //! The points of a jog, one per pass: along a fixed path, within limits of speed and acceleration, to a stop before
 //! whatever is in the way. Nothing here knows a connection or a clock.
 
-use handeye_core::geometry::arm::{IkError, JointKind, JointQuantity, JointRange, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-pub use handeye_core::plan::Contact;
-use handeye_core::plan::{self as planning, Guard, SpeedLimits};
+use handeye_arm::{IkError, JointKind, JointQuantity, JointRange, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
+pub use handeye_plan::Contact;
+use handeye_plan::{self as planning, Guard, SpeedLimits};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::joints::{CellJoint, in_rad, largest_change};
@@ -54,7 +54,7 @@ const SLOWER_STEPS: usize = 6;
 const AT_END: f64 = 1e-9;
 
 /// Why a jog goes no further.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum JogObstacle {
     /// A joint is at the end of its range.

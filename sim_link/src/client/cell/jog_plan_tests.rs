@@ -2,7 +2,7 @@ use approx::assert_relative_eq;
 use proptest::prelude::*;
 
 use super::*;
-use handeye_core::geometry::arm::ArmKind;
+use handeye_arm::ArmKind;
 
 const DT_S: f64 = 0.05;
 const START: JointValues = JointValues::of([0.2, 0.8, -1.1, 0.3, 1.4, -0.5]);

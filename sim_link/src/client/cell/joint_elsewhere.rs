@@ -1,6 +1,6 @@
 //! A joint that is not where it was sent.
 
-use handeye_core::geometry::arm::JointKind;
+use handeye_arm::JointKind;
 
 use crate::client::error::LinkError;
 

@@ -3,7 +3,7 @@
 //! Angles and lengths are limited and compared by one equivalence, [`RAD_PER_M`], so that each limit is one number. A
 //! joint that turns is compared exactly as if there were no others.
 
-use handeye_core::geometry::arm::{JointKind, JointRange, JointValues};
+use handeye_arm::{JointKind, JointRange, JointValues};
 
 use super::CellObjects;
 use crate::client::constants;

@@ -11,8 +11,8 @@
 //! An arm with joints to spare so gives way with them alone. Reference: Faverjon and Tournassoud 1987, "A local based approach for
 //! path planning of manipulators with a high number of degrees of freedom" (the bound on how fast a distance shrinks).
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::plan::Guard;
+use handeye_arm::JointValues;
+use handeye_plan::Guard;
 use nalgebra::{DMatrix, DVector, Matrix6xX};
 
 /// Step of a joint [rad, m of a prismatic one] over which the room is compared: it moves no point of an arm by more than a tenth of

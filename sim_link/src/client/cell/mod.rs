@@ -38,8 +38,8 @@ mod views;
 
 use std::sync::Arc;
 
-use handeye_core::geometry::arm::JointKind;
-use handeye_core::geometry::camera::Intrinsics;
+use handeye_arm::JointKind;
+use handeye_geometry::camera::Intrinsics;
 
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use board::{BoardMotion, BoardPath, UnknownPath};

@@ -9,10 +9,10 @@
 
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::plan::travel;
-use handeye_core::progress::CancelToken;
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_plan::travel;
 
 use super::arm::{MotionTolerance, SettleOptions};
 use super::joint_elsewhere::joint_elsewhere;
@@ -497,7 +497,7 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use handeye_core::geometry::arm::ArmKind;
+    use handeye_arm::ArmKind;
 
     /// A tip whose line leads through the column of the arm strays, and a stop does not take it back to its line first.
     #[test]

@@ -1,6 +1,6 @@
 //! Finding the parts of a cell in its scene.
 
-use handeye_core::geometry::arm::MAX_JOINTS;
+use handeye_arm::MAX_JOINTS;
 
 use super::{CellPart, CellPaths};
 use crate::client::constants;

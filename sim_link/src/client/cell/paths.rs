@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::client::constants;
-use handeye_core::text;
-use handeye_core::wording::Text;
+use handeye_wording::Text;
+use handeye_wording::text;
 
 /// Where the parts of the cell are in the scene: object paths as `sim.getObject` takes them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -68,7 +68,7 @@ pub enum CellPart {
 }
 
 /// What is no assignment of a path.
-#[derive(Debug, Clone, PartialEq, Eq, Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, Error, handeye_wording::Said)]
 pub enum BadCellPath {
     /// No part of that name.
     #[error("{0:?} is not a part of a cell: those are arm, joints, tip, target, camera, depth and board")]

@@ -1,11 +1,10 @@
 //! The chain of the arm of a scene, as the running simulation has it, and what it can reach.
 
-use handeye_core::geometry;
-use handeye_core::geometry::arm::{
+use handeye_arm::{
     ArmError, ArmFrames, ArmKind, DlsOptions, IkError, Joint, JointKind, JointRange, JointValues, MAX_JOINTS,
 };
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::wording::Text;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_wording::Text;
 use nalgebra::{Isometry3, Matrix6xX, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +34,7 @@ const ATTEMPTS: u32 = 5;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArmKinematics {
     /// From the arm frame to the connection, with the ranges of the scene.
-    arm: geometry::arm::Arm,
+    arm: handeye_arm::Arm,
     /// Whether that is the UR5 whose shape is known.
     is_ur5: bool,
     base_from_arm: Isometry3<f64>,
@@ -43,7 +42,7 @@ pub struct ArmKinematics {
 }
 
 /// Why the kinematics of an arm is not known.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
 #[non_exhaustive]
 pub enum UnknownKinematics {
     /// Where the arm stands is not known.
@@ -95,12 +94,12 @@ impl ArmKinematics {
     }
 
     /// That of an arm that is known otherwise, up to its tip.
-    pub fn new(arm: geometry::arm::Arm, base_from_arm: Isometry3<f64>) -> Self {
+    pub fn new(arm: handeye_arm::Arm, base_from_arm: Isometry3<f64>) -> Self {
         Self { arm, is_ur5: false, base_from_arm, connection_from_tip: Isometry3::identity() }
     }
 
     /// The arm from its frame to the connection, with its ranges.
-    pub fn arm(&self) -> &geometry::arm::Arm {
+    pub fn arm(&self) -> &handeye_arm::Arm {
         &self.arm
     }
 
@@ -158,7 +157,7 @@ impl ArmKinematics {
         self.solve(&arm, goal, seed)
     }
 
-    fn solve(&self, arm: &geometry::arm::Arm, goal: &Pose<Base, Tip>, seed: &[f64]) -> Result<JointValues, IkError> {
+    fn solve(&self, arm: &handeye_arm::Arm, goal: &Pose<Base, Tip>, seed: &[f64]) -> Result<JointValues, IkError> {
         if !goal.is_finite() {
             return Err(IkError::NotFinite);
         }
@@ -183,7 +182,7 @@ impl ArmKinematics {
     }
 
     /// The arm up to something that is fixed to the connection.
-    fn with_tip(&self, connection_from_tip: Isometry3<f64>) -> geometry::arm::Arm {
+    fn with_tip(&self, connection_from_tip: Isometry3<f64>) -> handeye_arm::Arm {
         let arm = self.arm.clone();
         let (base_from_first, flange_from_tip) = (arm.base_from_first, arm.flange_from_tip * connection_from_tip);
         arm.mounted(base_from_first, flange_from_tip)
@@ -304,7 +303,7 @@ impl Measured {
             arm_from_link = arm_from_joint * joint.motion(value);
             chain.push(joint);
         }
-        let arm = geometry::arm::Arm::new(chain, arm_from_link.inv_mul(&self.arm_from_tip))?;
+        let arm = handeye_arm::Arm::new(chain, arm_from_link.inv_mul(&self.arm_from_tip))?;
         Ok(ArmKinematics::new(arm, self.base_from_arm))
     }
 }

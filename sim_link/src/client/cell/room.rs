@@ -6,8 +6,8 @@
 //! board within a reach: by the share of its limits that the tip can have there in every direction at once, if nothing is touched,
 //! and by whether the whole board is still in the image there before the arm has moved.
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::{Isometry3, Matrix6, Matrix6xX, MatrixXx6, Point3, RowVector6, Translation3, UnitQuaternion, Vector3};
 
 use super::follow_goal::FollowLimits;
@@ -16,7 +16,7 @@ use super::joints::in_rad;
 use super::reach::ArmKinematics;
 use super::surroundings::Among;
 use super::views::BoardInView;
-use handeye_core::plan::{self as planning, Guard, PlannedView, Surroundings, ViewOptions};
+use handeye_plan::{self as planning, Guard, PlannedView, Surroundings, ViewOptions};
 
 /// With this share of its limits in every direction the tip goes along with a board at 50 mm/s that turns by 10° a second,
 /// and still comes closer to it.
@@ -94,7 +94,7 @@ pub struct FollowPlace {
 }
 
 /// There is no place to follow from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, crate::wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
 #[error(
     "of {tried} places that show the whole board none has room for the arm to follow it: move the board away from \
      the column of the arm, and not to the end of its reach"

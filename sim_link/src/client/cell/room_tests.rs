@@ -1,15 +1,15 @@
 use std::path::Path;
 
-use handeye_core::geometry::frames::Target;
-use handeye_core::plan::Obstacle;
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_geometry::frames::Target;
+use handeye_plan::Obstacle;
 
 use super::super::follow_goal::FollowGoal;
 use super::super::follow_plan::FollowPlan;
 use super::*;
 use crate::cell::motion::Course;
 use crate::cell::scene::{BoardMotionSpec, BoardPath, ResolvedScene, Scene};
-use handeye_core::geometry::arm::ArmKind;
+use handeye_arm::ArmKind;
 
 const DT_S: f64 = 0.05;
 

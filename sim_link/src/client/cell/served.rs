@@ -7,8 +7,8 @@
 
 use std::time::Instant;
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::progress::CancelToken;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
 
 use super::motion::{BRAKE_GRACE, LONGEST_BRAKING, LONGEST_MOTION};
 use super::{Arm, CellPart};

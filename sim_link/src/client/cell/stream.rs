@@ -9,8 +9,8 @@
 
 use std::time::Instant;
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::Arm;
 use super::arm::clock_past;

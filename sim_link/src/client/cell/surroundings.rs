@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use handeye_core::geometry::frames::{Base, Camera, Pose, Tip};
-use handeye_core::plan::{self as planning, Contact, Guard, Obstacle, Surroundings};
+use handeye_geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_plan::{self as planning, Contact, Guard, Obstacle, Surroundings};
 use nalgebra::{Isometry3, Point3};
 
 use super::Arm;

@@ -4,9 +4,9 @@ use std::sync::{Mutex, PoisonError};
 
 use approx::assert_relative_eq;
 use ciborium::Value;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::progress::CancelToken;
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::*;
@@ -616,7 +616,7 @@ fn the_truth_of_the_reference_scene_is_in_opencv_axes() {
 #[test]
 fn what_the_cell_publishes_goes_before_what_the_scene_shows() {
     let intrinsics = Intrinsics {
-        distortion: handeye_core::geometry::camera::Distortion::BrownConrady([0.1, 0.0, 0.001, 0.0, 0.0]),
+        distortion: handeye_geometry::camera::Distortion::BrownConrady([0.1, 0.0, 0.001, 0.0, 0.0]),
         ..Intrinsics::pinhole(4, 2, 3.7)
     };
     let base_from_target = Pose::from_translation_xyzw([0.0, -0.4, 0.8], [0.0, 0.0, 1.0, 0.0]);

@@ -1,9 +1,9 @@
 //! What a simulated cell says about itself, for comparison with what a calibration found.
 
 use ciborium::Value;
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
+use handeye_arm::JointValues;
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 
 use super::CellInfo;
 use super::objects::CellObjects;

@@ -1,14 +1,14 @@
 //! Views of a board for the arm of a scene: what the planner of views has to know, from what a client knows.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_core::targets::TargetSpec;
+use handeye_arm::JointValues;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
 use nalgebra::Isometry3;
 
 use super::reach::ArmKinematics;
-use handeye_core::plan::guided::choose::Robot;
-use handeye_core::plan::{self as planning, Obstacle, Pace, PlanError, Surroundings, ViewOptions, ViewSetup};
+use handeye_plan::guided::choose::Robot;
+use handeye_plan::{self as planning, Obstacle, Pace, PlanError, Surroundings, ViewOptions, ViewSetup};
 
 /// How far below its frame the arm is mounted \[m\]. What it stands on is taken for a table.
 const TABLE_BELOW_ARM_M: f64 = 0.0147;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::cell::scene::Scene;
-use handeye_core::geometry::arm::ArmKind;
+use handeye_arm::ArmKind;
 
 fn arm_and_board(scene: &Scene) -> (ArmKinematics, BoardInView, JointValues) {
     let scene = scene.resolve(scene.seed).expect("valid");

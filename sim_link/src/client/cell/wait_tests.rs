@@ -76,7 +76,7 @@ fn a_jog_and_a_following_arm_do_not_wait_for_a_clock_that_stands() {
     let kinematics = ArmKinematics::ur5(
         nalgebra::Isometry3::identity(),
         nalgebra::Isometry3::identity(),
-        &handeye_core::geometry::arm::ArmKind::Ur5Coppeliasim.ranges(),
+        &handeye_arm::ArmKind::Ur5Coppeliasim.ranges(),
     )
     .expect("ranges with room");
     let tip = kinematics.tip(&cell.client.arm().joint_values().expect("angles"));

@@ -1,7 +1,7 @@
 //! Motions of a tip by the inverse kinematics of the server, whole or step by step.
 
 use ciborium::Value;
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::{ObjectHandle, Sim};
 use crate::client::constants::{MOTION_DONE, MOTION_RUNNING, MOTION_STOPPED};

@@ -1,7 +1,7 @@
 //! Objects of the scene, their poses, and joints.
 
 use ciborium::Value;
-use handeye_core::geometry::frames::Pose;
+use handeye_geometry::frames::Pose;
 use nalgebra::{Point3, Vector3};
 
 use super::{JointInterval, ObjectHandle, Sim};

@@ -1,9 +1,9 @@
 //! Vision sensors.
 
 use ciborium::Value;
-use handeye_core::depth::DepthImage;
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::image::RgbImage;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::depth::DepthImage;
+use image::RgbImage;
 
 use super::{ObjectHandle, Sim};
 use crate::client::constants::{

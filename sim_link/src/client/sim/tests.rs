@@ -1,4 +1,4 @@
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::Vector3;
 
 use super::*;

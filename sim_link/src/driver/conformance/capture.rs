@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use handeye_core::capture::{Machine, Plan, Progress, Refusal, RobotRate, STILL_RATE_RAD_S, Shot};
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::project::files::image_file::gray_from_rgb;
+use handeye_arm::JointValues;
+use handeye_capture::{Machine, Plan, Progress, Refusal, RobotRate, STILL_RATE_RAD_S, Shot};
+use handeye_images::gray_from_rgb;
 
 use super::super::limits;
 use super::super::message::Ability;

@@ -10,7 +10,7 @@ mod report;
 
 use std::time::{Duration, Instant};
 
-use handeye_core::progress::CancelToken;
+use handeye_geometry::progress::CancelToken;
 
 use super::client::Driver;
 use super::error::{DriverError, Ending};

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::super::limits;
 use super::super::message::Ability;

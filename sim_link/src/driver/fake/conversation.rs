@@ -4,8 +4,8 @@ use std::io::{BufRead, Read, Write};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::progress::CancelToken;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
 use serde::Serialize;
 
 use super::super::message::{

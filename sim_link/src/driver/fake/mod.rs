@@ -9,8 +9,8 @@ mod stamps;
 use std::io::{BufRead, Write};
 use std::sync::Mutex;
 
-use handeye_core::geometry::arm::ArmKind;
-use handeye_core::geometry::frames::Base;
+use handeye_arm::ArmKind;
+use handeye_geometry::frames::Base;
 use nalgebra::Isometry3;
 
 use crate::cell::scene::{ArmSpec, RobotSpec, Scene, SceneError};

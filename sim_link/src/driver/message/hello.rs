@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use handeye_core::geometry::arm::{JointKind, MAX_JOINTS};
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
+use handeye_arm::{JointKind, MAX_JOINTS};
+use handeye_geometry::camera::{Distortion, Intrinsics};
 use serde::{Deserialize, Serialize};
 
 use super::PROTOCOL;
@@ -46,7 +46,7 @@ impl fmt::Display for Ability {
     }
 }
 
-handeye_core::plain_values!(Ability);
+handeye_wording::plain_values!(Ability);
 
 /// A joint as the driver's `hello` has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

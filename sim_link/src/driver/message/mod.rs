@@ -8,7 +8,7 @@ mod hello;
 mod images;
 mod robot;
 
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
 use serde::{Deserialize, Serialize};
 
 pub use error::BadMessage;

@@ -1,7 +1,7 @@
 //! Where the robot is, as a driver says it.
 
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::geometry::frames::{Frame, Pose};
+use handeye_arm::JointValues;
+use handeye_geometry::frames::{Frame, Pose};
 use serde::{Deserialize, Serialize};
 
 use super::error::BadMessage;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::arm::JointKind;
-use handeye_core::project::dataset::PoseFormat;
+use handeye_arm::JointKind;
+use handeye_dataset::PoseFormat;
 
 use super::watch::{Capture, Watch};
 use crate::driver::message::{

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use handeye_core::project::dataset::{PoseFormat, PoseOfImage};
+use handeye_dataset::{PoseFormat, PoseOfImage};
 use serde_json::Value;
 
 /// Endings, in the order in which they are looked for.

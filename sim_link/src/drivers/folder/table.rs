@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use handeye_core::project::dataset::{PoseFormat, PoseOfImage};
+use handeye_dataset::{PoseFormat, PoseOfImage};
 
 /// A last line without an end counts once the file has been left alone for so long.
 const REST_S: f64 = 1.0;

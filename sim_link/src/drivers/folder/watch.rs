@@ -4,10 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 use std::time::SystemTime;
 
-use handeye_core::image::RgbImage;
-use handeye_core::natural_order;
-use handeye_core::project::dataset::{PoseFormat, PoseOfImage};
-use handeye_core::project::files::image_file;
+use handeye_dataset::{PoseFormat, PoseOfImage};
+use handeye_geometry::natural_order;
+use image::RgbImage;
 
 use super::side_file;
 use super::table::GrowingTable;
@@ -225,7 +224,7 @@ struct NotRead {
 #[expect(clippy::type_complexity, reason = "size, encoding and bytes")]
 fn read_image(path: &Path) -> Result<((u32, u32), ImageEncoding, Vec<u8>), NotRead> {
     let fail = |text: String| NotRead { text, is_incomplete: true };
-    let image: RgbImage = image_file::load_rgb(path).map_err(|error| fail(error.to_string()))?;
+    let image: RgbImage = handeye_images::load_rgb(path).map_err(|error| fail(error.to_string()))?;
     let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
     let size = image.dimensions();
     let (encoding, bytes) = match bytes.as_slice() {

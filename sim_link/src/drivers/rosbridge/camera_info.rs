@@ -1,6 +1,6 @@
 //! What `sensor_msgs/CameraInfo` says about the lens.
 
-use handeye_core::geometry::camera::Distortion;
+use handeye_geometry::camera::Distortion;
 
 use super::messages::CameraInfo;
 use crate::driver::message::LensMessage;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use nalgebra::Isometry3;
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use handeye_core::image::{ImageFormat, ImageReader};
+use image::{ImageFormat, ImageReader};
 
 use super::messages::AnyImage;
 use crate::driver::message::{DepthEncoding, ImageEncoding, MAX_IMAGE_SIDE};

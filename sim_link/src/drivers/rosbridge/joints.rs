@@ -1,6 +1,6 @@
 //! Joint values out of `sensor_msgs/JointState`, in the order of the arm.
 
-use handeye_core::geometry::arm::JointValues;
+use handeye_arm::JointValues;
 
 use super::messages::JointState;
 use crate::drivers::interpolate::Samples;

@@ -1,6 +1,6 @@
 //! A Universal Robots controller as a driver reads it.
 
-use handeye_core::geometry::arm::JointKind;
+use handeye_arm::JointKind;
 
 use super::modes::{POWER_ON, robot_mode, safety_mode};
 use super::{RtdeClient, RtdeOptions, Sample};

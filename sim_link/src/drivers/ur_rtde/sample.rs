@@ -1,6 +1,6 @@
 //! What is read of the controller, and the bytes that it is in.
 
-use handeye_core::geometry::frames::{Base, Frame, Pose, Tip};
+use handeye_geometry::frames::{Base, Frame, Pose, Tip};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::RtdeError;

@@ -4,10 +4,10 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-use handeye_core::image::{ImageFormat, Rgb, RgbImage};
-use handeye_core::project::dataset::PoseFormat;
+use handeye_dataset::PoseFormat;
 use handeye_sim_link::driver::message::{Ability, FromDriver, ImageEncoding};
 use handeye_sim_link::drivers::folder::{Folder, FolderOptions};
+use image::{ImageFormat, Rgb, RgbImage};
 
 use super::Talk;
 

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use handeye_core::geometry::arm::JointKind;
-use handeye_core::geometry::camera::Distortion;
-use handeye_core::testing::python;
+use handeye_arm::JointKind;
+use handeye_geometry::camera::Distortion;
+use handeye_geometry::testing::python;
 use handeye_sim_link::driver::message::{Ability, FromDriver, ImageEncoding, JointMessage};
 use handeye_sim_link::drivers::rosbridge::{Rosbridge, RosbridgeOptions};
 use handeye_sim_link::testing::{RosScene, RosVersion, RosbridgeServer, Topic};

@@ -1,6 +1,6 @@
 //! `handeye driver ur-rtde` in front of a controller that PyPI's `ur_rtde` reads too.
 
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
 use handeye_sim_link::driver::message::{Ability, ArmMessage, FromDriver, ToDriver};
 use handeye_sim_link::drivers::ur_rtde::{RtdeOptions, UrRtde, UrRtdeOptions};
 use handeye_sim_link::testing::{Output, RtdeRobot, RtdeScript};

@@ -1,6 +1,6 @@
 //! A stop at any instant of any motion leaves an arm that can be moved on, whatever moves its joints.
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_sim_link::cell::scene::{JointModeSpec, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::{

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::{Child, ChildStderr};
 use std::time::{Duration, Instant};
 
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::Session;
+use handeye_result::CalibrationResult;
+use handeye_session::Session;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::ConnectionOptions;

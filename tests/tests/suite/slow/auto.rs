@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use handeye_core::project::dataset::Dataset;
-use handeye_core::project::result::{CalibrationResult, ViewRecordStatus};
-use handeye_core::project::session::Session;
-use handeye_core::testing::python;
+use handeye_dataset::Dataset;
+use handeye_geometry::testing::python;
+use handeye_result::{CalibrationResult, ViewRecordStatus};
+use handeye_session::Session;
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 
 fn handeye(arguments: &[&str]) -> Output {

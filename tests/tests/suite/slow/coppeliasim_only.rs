@@ -4,9 +4,9 @@
 use std::path::Path;
 use std::process::Command;
 
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_result::CalibrationResult;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};

@@ -3,7 +3,7 @@
 
 use std::process::{Command, Output};
 
-use handeye_core::targets::{Grid, TargetSpec};
+use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};

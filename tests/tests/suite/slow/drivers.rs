@@ -3,7 +3,7 @@
 use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};
 
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
 use serde_json::Value;
 

@@ -4,15 +4,15 @@ use std::process::Command as Process;
 
 use handeye_app::command::Command;
 use handeye_app::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
-use handeye_core::geometry::frames::{Camera, Pose, Target};
-use handeye_core::project::session::CaptureId;
-use handeye_core::track::State;
+use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_session::CaptureId;
 use handeye_sim_link::cell::scene::{BoardMotionSpec, Scene};
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_sim_link::client::cell::FollowLimits;
 use handeye_sim_link::client::{CallOptions, ConnectionOptions, Sim};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, workspace_root};
+use handeye_track::State;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 

@@ -8,16 +8,16 @@ use handeye_app::command::Command;
 use handeye_app::guided::state::GuidedProgress;
 use handeye_app::model::{CellSource, JogSettings, Model, Motion, MotionGoal};
 use handeye_app::text::Text;
-use handeye_core::geometry::planar_pose;
-use handeye_core::nalgebra::Point3;
-use handeye_core::plan::guided::record::GuidedRecord;
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::Role;
-use handeye_core::targets::observation::Corner;
+use handeye_geometry::planar_pose;
+use handeye_geometry::targets::observation::Corner;
+use handeye_result::CalibrationResult;
+use handeye_result::guided_record::GuidedRecord;
+use handeye_session::Role;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry, workspace_root};
+use nalgebra::Point3;
 
 fn auto(folder: &Path, arguments: &[&str]) -> Output {
     let out = folder.join("session");

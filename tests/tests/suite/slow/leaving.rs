@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use handeye_app::command::Command;
 use handeye_app::model::{CellSource, Model, SolveStatus};
-use handeye_core::geometry::arm::JointValues;
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::project::session::Store;
+use handeye_arm::JointValues;
+use handeye_result::CalibrationResult;
+use handeye_session::Store;
 use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::CellProcess;

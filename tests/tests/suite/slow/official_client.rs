@@ -3,8 +3,8 @@
 
 use std::process::Command;
 
-use handeye_core::project::result::CalibrationResult;
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
+use handeye_result::CalibrationResult;
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 
 fn run(python: &std::path::Path, script: &str, arguments: &[&str], cbor: &str) -> String {

@@ -5,7 +5,7 @@ use std::os::unix::fs::{PermissionsExt as _, symlink};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
 
 use crate::solved::{handeye, text};

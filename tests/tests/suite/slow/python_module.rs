@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
 use tempfile::TempDir;
 

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use handeye_core::testing::python;
+use handeye_geometry::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
 
 #[test]

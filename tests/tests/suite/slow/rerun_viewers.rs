@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use handeye_app::command::Command as WorkbenchCommand;
 use handeye_app::model::{CellSource, Model, ViewerState};
 use handeye_app::rerun_log::RerunChoice;
-use handeye_core::testing::{Need, programs, python, skip};
+use handeye_geometry::testing::{Need, programs, python, skip};
 use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::watch::Watch;
 use handeye_tests::workbench::Workbench;

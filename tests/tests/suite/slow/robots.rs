@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use handeye_core::image::RgbImage;
 use handeye_sim_link::client::CancelToken;
 use handeye_sim_link::driver::{DriverCell, DriverCellSpec, DriverOptions};
 use handeye_sim_link::testing::{RosScene, RosVersion, RosbridgeServer, RtdeRobot, RtdeScript};
 use handeye_tests::handeye_binary;
+use image::RgbImage;
 use serde_json::Value;
 
 use crate::solved::handeye;

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use handeye_app::command::Command;
 use handeye_app::model::CellSource;
-use handeye_core::estimate::handeye::HandEye;
-use handeye_core::geometry::se3;
-use handeye_core::project::result::{CalibrationResult, TransformEstimate};
+use handeye_estimate::handeye::HandEye;
+use handeye_geometry::se3;
+use handeye_result::{CalibrationResult, TransformEstimate};
 use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::workbench::Workbench;

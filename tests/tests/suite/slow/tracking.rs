@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use handeye_core::geometry::frames::{Base, Pose, Target};
-use handeye_core::targets::{Grid, TargetSpec};
-use handeye_core::testing::python;
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_geometry::testing::python;
 use handeye_sim_link::client::cell::{Arm, CellClient, CellPaths, MotionTolerance, SettleOptions};
 use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
@@ -150,10 +150,8 @@ fn at_first_pose(endpoint: &str) -> Arm {
     let (mut arm, _feed) = cell.split();
     arm.sim().start_simulation().expect("started");
     let file = workspace_root().join("assets/poses/seed10.toml");
-    let poses = handeye_core::project::taught_poses::TaughtPoses::read(&file).expect("poses");
-    let handeye_core::project::taught_poses::Goal::Tip(first) = &poses.poses[0].goal else {
-        panic!("a pose of the tip")
-    };
+    let poses = handeye_dataset::taught_poses::TaughtPoses::read(&file).expect("poses");
+    let handeye_dataset::taught_poses::Goal::Tip(first) = &poses.poses[0].goal else { panic!("a pose of the tip") };
     let limits = MotionLimits::uniform(4, 0.5, 1.0, 10.0);
     let cancel = CancelToken::default();
     arm.move_to_pose(first, &limits, &MotionTolerance::default(), &cancel).expect("there");

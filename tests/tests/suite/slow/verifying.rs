@@ -2,8 +2,8 @@
 
 use handeye_app::command::Command;
 use handeye_app::model::{CellSource, JogSettings, Model, Motion};
-use handeye_core::geometry::frames::{Base, Pose, Tip};
-use handeye_core::project::session::Role;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_session::Role;
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::workbench::Workbench;

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use crossbeam_channel::bounded;
-use handeye_core::capture::{Scatter, Wait};
-use handeye_core::project::taught_poses::{Goal, TaughtPoses};
+use handeye_capture::{Scatter, Wait};
+use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_sim_link::cell::scene::Scene;
 use handeye_sim_link::client::{CancelToken, MotionLimits};
 
@@ -143,10 +143,10 @@ fn every_live_image_is_judged_and_a_paused_simulation_is_named() {
     };
     let hit_ms = ms(&hits);
     // A board of another size is a miss in every image.
-    let other = handeye_core::targets::Grid { columns: 13, rows: 9, square_m: 0.015 };
+    let other = handeye_geometry::targets::Grid { columns: 13, rows: 9, square_m: 0.015 };
     bench
         .workers
-        .ask_vision(VisionTask::SetTarget(handeye_core::targets::TargetSpec::Chessboard(other)))
+        .ask_vision(VisionTask::SetTarget(handeye_geometry::targets::TargetSpec::Chessboard(other)))
         .expect("takes");
     let misses: Vec<_> = bench.live(25).split_off(5);
     assert!(misses.iter().all(|detection| detection.corners.is_none() && detection.problem.is_none()));

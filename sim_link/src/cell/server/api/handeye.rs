@@ -1,8 +1,8 @@
 //! `handeye.*`: what the cell offers beyond CoppeliaSim's API.
 
 use ciborium::Value;
-use handeye_core::geometry::camera::{Distortion, Intrinsics};
-use handeye_core::geometry::frames::{Camera, Pose, Sensor, Tip};
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::frames::{Camera, Pose, Sensor, Tip};
 use nalgebra::Isometry3;
 
 use super::{Call, Effect, Outcome, Table, nothing, one};

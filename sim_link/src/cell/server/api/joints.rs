@@ -6,7 +6,7 @@ use super::{Call, Outcome, Table, one, several};
 use crate::cell::server::args::ApiError;
 use crate::cell::world::{DriveLimits, Joint, JointMode, State};
 use crate::wire;
-use handeye_core::geometry::arm::JointKind;
+use handeye_arm::JointKind;
 
 pub(super) const FUNCTIONS: Table = &[
     ("getJointPosition", get_joint_position),

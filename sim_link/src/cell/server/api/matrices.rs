@@ -135,7 +135,7 @@ fn get_quaternion_from_matrix(call: &mut Call<'_>) -> Outcome {
 /// Axis, in the frame that both are given in, and angle of the rotation from one orientation to another.
 fn get_rotation_axis(call: &mut Call<'_>) -> Outcome {
     let at = |index| if call.args.numbers(index)?.len() == 7 { pose_at(call, index) } else { matrix_at(call, index) };
-    let turn = handeye_core::geometry::se3::rotation_vector(&(at(1)?.rotation * at(0)?.rotation.inverse()));
+    let turn = handeye_geometry::se3::rotation_vector(&(at(1)?.rotation * at(0)?.rotation.inverse()));
     let angle = turn.norm();
     let axis = if angle > 0.0 { turn / angle } else { Vector3::x() };
     several([wire::floats(axis.iter().copied()), Value::Float(angle)])

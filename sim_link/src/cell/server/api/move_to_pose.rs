@@ -14,8 +14,8 @@ use crate::cell::server::plans::{
 use crate::cell::server::task::Answer;
 use crate::cell::world::{Chain, Flagged, Handle, poses};
 use crate::wire::{self, Reader};
-use handeye_core::geometry::arm::{DlsOptions, JointRange};
-use handeye_core::geometry::frames::Pose;
+use handeye_arm::{DlsOptions, JointRange};
+use handeye_geometry::frames::Pose;
 
 pub(super) const FUNCTIONS: Table = &[
     ("moveToPose", move_to_pose),

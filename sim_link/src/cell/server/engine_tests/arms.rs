@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use handeye_core::geometry::arm::{JointKind, JointValues};
+use handeye_arm::{JointKind, JointValues};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
 use super::*;
 use crate::cell::recorded::{SessionOptions, record};
 use crate::cell::render::Shape;
 use crate::cell::world::Chain;
-use handeye_core::plan::{ViewOptions, ViewSetup, poses_looking_at};
+use handeye_plan::{ViewOptions, ViewSetup, poses_looking_at};
 
 const JOINT_REVOLUTE: i64 = 10;
 const JOINT_PRISMATIC: i64 = 11;
@@ -21,7 +21,7 @@ fn shipped(name: &str) -> Scene {
 
 /// An xArm 6 on a track: its first joint is prismatic.
 fn on_track() -> Scene {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/src/testing/arms/xarm6_on_track.urdf");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/arm/src/testing/arms/xarm6_on_track.urdf");
     let text = format!(
         "[robot]\nmodel = {{ urdf = {file:?}, tip = \"link6\" }}\nstart_joints_deg = [0.1, 0, -45, -35, 0, 80, 0]\n"
     );
@@ -35,7 +35,7 @@ fn ur3e() -> Scene {
 
 /// A UR5 as ROS has it: its axes are not the z axes of its frames.
 fn ur5_of_ros() -> Scene {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/src/testing/arms/ur5.urdf");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/arm/src/testing/arms/ur5.urdf");
     let text = format!(
         "[robot]\nmodel = {{ urdf = {file:?}, tip = \"tool0\" }}\nstart_joints_deg = [0, -90, 90, -90, -90, 0]\n"
     );
@@ -53,7 +53,7 @@ fn scenes() -> [(&'static str, Scene, usize); 5] {
 }
 
 /// Places in the ranges of all joints, the same in every run.
-fn places(arm: &handeye_core::geometry::arm::Arm) -> impl Iterator<Item = JointValues> + '_ {
+fn places(arm: &handeye_arm::Arm) -> impl Iterator<Item = JointValues> + '_ {
     (0..20_u32).map(|place| {
         JointValues::from_fn(arm.joint_count(), |i| {
             let range = arm.joints()[i].range;

@@ -1,7 +1,7 @@
 //! The board that moves, hides, and is where the moment of an image says.
 
-use handeye_core::geometry::camera::Intrinsics;
-use handeye_core::geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
 use nalgebra::{Matrix2, Point3, Vector2};
 
 use super::*;

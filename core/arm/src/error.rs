@@ -1,0 +1,77 @@
+//! Why an arm, or joint values of it, are of no use.
+
+use super::MAX_JOINTS;
+
+/// What is wrong with a joint.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[non_exhaustive]
+pub enum JointDefect {
+    /// NaN or infinite.
+    #[error("where it sits has a number that is not finite")]
+    NotFinite,
+    /// Farther from the one before it than in any arm.
+    #[error("it is {length_m} m from its neighbour; lengths are in metres")]
+    TooLong {
+        /// Distance, metres.
+        length_m: f64,
+    },
+    /// No direction.
+    #[error("its axis has no direction")]
+    Axis,
+    /// No room to move.
+    #[error("it goes from {min} to {max} at {speed} a second; it needs a range with room, and a speed above zero")]
+    Range {
+        /// Smallest value.
+        min: f64,
+        /// Largest value.
+        max: f64,
+        /// Largest speed.
+        speed: f64,
+    },
+}
+
+/// Why an arm, or joint values with it, cannot be computed with.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[non_exhaustive]
+pub enum ArmError {
+    /// No joints, or more than any arm has.
+    #[error("an arm of {got} joints: it must have 1 to {MAX_JOINTS}")]
+    JointCount {
+        /// Joints given.
+        got: usize,
+    },
+    /// A number of a row that no arm has.
+    #[error("{name} of joint {joint} is {value}: lengths are in metres, angles in radians, at most one turn")]
+    BadRow {
+        /// The joint, counted from 1.
+        joint: usize,
+        /// Which number.
+        name: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// A joint that no arm has.
+    #[error("joint {joint} ({name}): {defect}")]
+    BadJoint {
+        /// The joint, counted from 1.
+        joint: usize,
+        /// What it is called.
+        name: String,
+        /// What is wrong with it.
+        defect: JointDefect,
+    },
+    /// Values for another number of joints.
+    #[error("{got} joint values for an arm of {need} joints")]
+    WrongCount {
+        /// Values given.
+        got: usize,
+        /// Joints of the arm.
+        need: usize,
+    },
+    /// NaN or infinite.
+    #[error("the value of joint {joint} is not finite")]
+    NotFinite {
+        /// The joint, counted from 1.
+        joint: usize,
+    },
+}

@@ -1,0 +1,232 @@
+//! What can be wrong with a URDF file.
+
+use crate::{ArmError, MAX_JOINTS};
+use handeye_wording::Text;
+use handeye_wording::text;
+
+/// What is wrong, in which file, and where in it: `FILE, line N: what, and what to do`.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[error("{place}: {problem}", place = place(file, *line))]
+#[non_exhaustive]
+pub struct UrdfError {
+    /// The file as it was named.
+    pub file: String,
+    /// Line of the element, counted from 1; `None` when the file as a whole is meant.
+    pub line: Option<u32>,
+    /// What is wrong there.
+    pub problem: Box<UrdfProblem>,
+}
+
+/// The place of an error on one line, whatever the file is called.
+fn place(file: &str, line: Option<u32>) -> Text {
+    let file = if file.contains(char::is_control) { format!("{file:?}") } else { file.to_owned() };
+    match line {
+        Some(line) => text!("{file}, line {line}", file = file, line = line),
+        None => text!("{file}", file = file),
+    }
+}
+
+/// A defect of a URDF file, or of what was asked of it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[non_exhaustive]
+pub enum UrdfProblem {
+    /// The file system says no, or it is not text.
+    #[error("cannot be read: {0}")]
+    Unreadable(String),
+    /// Not well-formed.
+    #[error("is not XML: {0}")]
+    NotXml(String),
+    /// The source of a URDF.
+    #[error("is xacro source, from which a URDF is made first: run `xacro FILE > robot.urdf` and name robot.urdf")]
+    Xacro,
+    /// Another format.
+    #[error("is not a URDF: its root element is <{root}> instead of <robot>")]
+    NotUrdf {
+        /// The element.
+        root: String,
+    },
+    /// Something that every element of the kind has.
+    #[error("{element} has no {what}")]
+    Missing {
+        /// The element, with its name where it has one.
+        element: String,
+        /// What it lacks.
+        what: &'static str,
+    },
+    /// Two of a name.
+    #[error("{element} is there twice: names of links and of joints are unique")]
+    Twice {
+        /// The element with its name.
+        element: String,
+    },
+    /// A joint at a link that does not exist.
+    #[error(
+        "the {end} of joint \"{joint}\" is link \"{link}\", which the file does not have: add the link or correct the name"
+    )]
+    UnknownLink {
+        /// The joint.
+        joint: String,
+        /// `parent` or `child`.
+        end: &'static str,
+        /// The link that it names.
+        link: String,
+    },
+    /// A link behind two joints.
+    #[error(
+        "link \"{link}\" is the child of two joints, \"{first}\" and \"{second}\": a URDF is a tree, and a loop of links \
+         cannot be computed with; leave one of the joints out"
+    )]
+    TwoParents {
+        /// The link.
+        link: String,
+        /// One joint.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Links in a ring.
+    #[error("joints lead in a loop through link \"{link}\" and back to it: leave out the joint that closes it")]
+    Loop {
+        /// A link of the ring.
+        link: String,
+    },
+    /// More than one link that the arm could stand on.
+    #[error("has {count} links without a parent, {links}: name the one that the arm stands on as the base link", count = links.len(), links = quoted(links))]
+    SeveralRoots {
+        /// All of them.
+        links: Vec<String>,
+    },
+    /// More than one link that could carry the tool.
+    #[error("has {count} links at an end, {links}: name the one that is the tip", count = links.len(), links = quoted(links))]
+    SeveralLeaves {
+        /// All of them.
+        links: Vec<String>,
+    },
+    /// A name that is none of a link.
+    #[error("has no link \"{name}\"; it has {links}", links = quoted(links))]
+    NoSuchLink {
+        /// What was asked for.
+        name: String,
+        /// The links there are.
+        links: Vec<String>,
+    },
+    /// The tip is not carried by the base.
+    #[error("link \"{tip}\" does not hang on link \"{base}\": name a base link that the joints lead from to the tip")]
+    NotBelow {
+        /// The base link.
+        base: String,
+        /// The tip link.
+        tip: String,
+    },
+    /// A joint that is neither revolute nor prismatic.
+    #[error(
+        "joint \"{joint}\" between base and tip is {kind}: a chain has revolute, continuous, prismatic and fixed joints; \
+         name a base link behind it"
+    )]
+    Unsupported {
+        /// The joint.
+        joint: String,
+        /// Its type as the file has it.
+        kind: String,
+    },
+    /// A joint that follows another.
+    #[error(
+        "joint \"{joint}\" between base and tip follows joint \"{of}\" (mimic), which a chain of independent joints cannot: \
+         name a tip link in front of it, or make it fixed"
+    )]
+    Mimic {
+        /// The joint.
+        joint: String,
+        /// The one it follows.
+        of: String,
+    },
+    /// Text where numbers belong, too many of them, or one that is not finite.
+    #[error("{attribute} of joint \"{joint}\" is \"{text}\": it takes {needs}")]
+    BadNumber {
+        /// The joint.
+        joint: String,
+        /// Element and attribute.
+        attribute: &'static str,
+        /// What it says.
+        text: String,
+        /// What it should.
+        needs: &'static str,
+    },
+    /// No direction.
+    #[error("the axis of joint \"{joint}\" is 0 0 0: give its direction, for example 0 0 1")]
+    ZeroAxis {
+        /// The joint.
+        joint: String,
+    },
+    /// A revolute or prismatic joint without an end.
+    #[error(
+        "{kind} joint \"{joint}\" has no <limit> with lower and upper: add them; a joint that turns without end is continuous"
+    )]
+    NoLimit {
+        /// The joint.
+        joint: String,
+        /// Its type.
+        kind: String,
+    },
+    /// No room between the limits.
+    #[error("joint \"{joint}\" goes from {lower} to {upper}: lower has to be below upper")]
+    InvertedLimit {
+        /// The joint.
+        joint: String,
+        /// Lower limit, radians or metres.
+        lower: f64,
+        /// Upper limit.
+        upper: f64,
+    },
+    /// A speed that lets it stand still for ever.
+    #[error("the velocity of joint \"{joint}\" is {speed}: it has to be above zero, or left out when it is not known")]
+    BadSpeed {
+        /// The joint.
+        joint: String,
+        /// What it says.
+        speed: f64,
+    },
+    /// A length that no arm has.
+    #[error(
+        "{what} of joint \"{joint}\" is {length_m} m, longer than any arm: lengths of a URDF are in metres, are these millimetres?"
+    )]
+    TooLong {
+        /// The joint.
+        joint: String,
+        /// What is so long.
+        what: &'static str,
+        /// How long.
+        length_m: f64,
+    },
+    /// No arm at all, or more joints than one has.
+    #[error(
+        "has {got} joints that move between \"{base}\" and \"{tip}\": a chain has 1 to {MAX_JOINTS}; name other links"
+    )]
+    JointCount {
+        /// How many.
+        got: usize,
+        /// The base link.
+        base: String,
+        /// The tip link.
+        tip: String,
+    },
+    /// What the chain itself says.
+    #[error("between \"{base}\" and \"{tip}\": {error}")]
+    Arm {
+        /// The base link.
+        base: String,
+        /// The tip link.
+        tip: String,
+        /// Why.
+        error: ArmError,
+    },
+}
+
+/// Names in quotes, with commas between; of very many the first.
+fn quoted(names: &[String]) -> Text {
+    const SHOWN: usize = 12;
+    let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("\"{name}\"")).collect();
+    let more = names.len().saturating_sub(SHOWN);
+    let shown = shown.join(", ");
+    if more > 0 { text!("{names} and {more} more", names = shown, more = more) } else { Text::verbatim(shown) }
+}

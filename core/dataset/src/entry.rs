@@ -1,0 +1,31 @@
+//! One view of a data set.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector6;
+
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::observation::Corner;
+
+/// One view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// The image as the pose table names it; without a table its path in the folder. No two entries have the same.
+    pub name: String,
+    /// The image file; `None` when only corners or target poses were kept.
+    pub image_path: Option<PathBuf>,
+    /// Tip pose as the controller reported it; `None` when there is no robot.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// Joint angles as the controller reported them, radians; `None` when the pose table has none.
+    pub joints_rad: Option<Vec<f64>>,
+    /// How the tip moves with each joint, see [`handeye_arm::Arm::tip_by_joint_at`]; empty without joint angles, without
+    /// the arm, or where the two do not fit the poses, see [`Dataset::arm`](super::Dataset::arm).
+    pub tip_by_joint: Vec<Vector6<f64>>,
+    /// Corners detected elsewhere, sorted by index, empty when the target was not found in this image; `None` when
+    /// the data set has no corner table.
+    pub corners: Option<Vec<Corner>>,
+    /// Target pose measured elsewhere; `None` when the data set has no such table, or no row for this view.
+    pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// Row in the pose table, as an editor counts it.
+    pub row: Option<usize>,
+}

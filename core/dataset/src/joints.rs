@@ -1,0 +1,114 @@
+//! Joint angles of a data set: their columns, the arm they belong to, and what they are good for.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::Entry;
+use super::error::DatasetProblem;
+use crate::value::{AngleUnit, Spanning, bad};
+use handeye_arm::{ArmKind, ArmModel, MAX_JOINTS};
+use handeye_estimate::placement::{self, JointView, Placement, PlacementError, TipByJoint};
+
+/// The columns of joint angles, after those of the rotation.
+pub(super) const COLUMNS: [&str; MAX_JOINTS] =
+    ["q1", "q2", "q3", "q4", "q5", "q6", "q7", "q8", "q9", "q10", "q11", "q12"];
+
+/// The table `[robot.arm]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawArm {
+    kind: Option<ArmKind>,
+    dh: Option<Vec<[f64; 4]>>,
+}
+
+/// What `[robot]` says of joint angles.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct JointColumns {
+    /// How many columns there are.
+    pub count: usize,
+    pub unit: AngleUnit,
+    pub arm: Option<ArmModel>,
+}
+
+/// Checks what `[robot]` says of joint angles; `None` when it says nothing.
+pub(super) fn joint_columns(
+    joints: Option<&Spanned<i64>>,
+    unit: Option<AngleUnit>,
+    arm: Option<&Spanned<RawArm>>,
+    whole: std::ops::Range<usize>,
+) -> Result<Option<JointColumns>, Spanning> {
+    let missing = |span, key, why| (span, DatasetProblem::MissingKey { table: "robot", key, why });
+    let Some(joints) = joints else {
+        return match (arm, unit) {
+            (Some(arm), _) => {
+                let why = "[robot.arm] is given: how many columns q1, q2, … follow the rotation in the pose table";
+                Err(missing(arm.span(), "joints", why))
+            }
+            (None, Some(_)) => {
+                Err(missing(whole, "joints", "joint_unit is given: how many columns q1, q2, … follow the rotation"))
+            }
+            (None, None) => Ok(None),
+        };
+    };
+    let count = usize::try_from(*joints.get_ref()).unwrap_or(0);
+    if count == 0 || count > MAX_JOINTS {
+        return Err(bad(joints, "joints", "a whole number of joints from 1 to 12"));
+    }
+    let Some(unit) = unit else {
+        return Err(missing(joints.span(), "joint_unit", "joint angles are in \"rad\" or \"deg\""));
+    };
+    let arm = arm.map(|raw| arm_model(raw, count)).transpose()?;
+    Ok(Some(JointColumns { count, unit, arm }))
+}
+
+fn arm_model(raw: &Spanned<RawArm>, joints: usize) -> Result<ArmModel, Spanning> {
+    let at = |problem| (raw.span(), problem);
+    let model = match raw.get_ref() {
+        RawArm { kind: Some(kind), dh: None } => ArmModel::Kind(*kind),
+        RawArm { kind: None, dh: Some(rows) } => ArmModel::Dh(rows.clone()),
+        RawArm { .. } => return Err(at(DatasetProblem::Conflict("[robot.arm] has either kind or dh"))),
+    };
+    let need = model.arm().map_err(|error| at(DatasetProblem::Arm(error)))?.joint_count();
+    if joints != need {
+        return Err(at(DatasetProblem::JointCount { got: joints, need }));
+    }
+    Ok(model)
+}
+
+/// The arm of a data set, and how well joint angles and reported poses fit together with it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DatasetArm {
+    /// The arm as `[robot.arm]` names it.
+    pub model: ArmModel,
+    /// Where it stands and how far each view, in the order of the entries, is from it; why the joint angles are not
+    /// used otherwise. Then every [`Entry::tip_by_joint`] is empty.
+    pub placement: Result<Placement, PlacementError>,
+}
+
+impl DatasetArm {
+    /// Checks the joint angles against the poses, and fills in how the tip moves with each joint where they fit.
+    pub(super) fn of(model: ArmModel, entries: &mut [Entry]) -> Self {
+        let placement = placed(&model, entries);
+        if let Ok((_, twists)) = &placement {
+            for (entry, twists) in entries.iter_mut().zip(twists) {
+                entry.tip_by_joint.clone_from(twists);
+            }
+        }
+        Self { model, placement: placement.map(|(placement, _)| placement) }
+    }
+}
+
+fn placed(model: &ArmModel, entries: &[Entry]) -> Result<(Placement, TipByJoint), PlacementError> {
+    // Every row of the table has a pose and joint angles.
+    let views: Vec<JointView<'_>> = entries
+        .iter()
+        .filter_map(|entry| {
+            Some(JointView { base_from_tip: entry.base_from_tip?, joints_rad: entry.joints_rad.as_deref()? })
+        })
+        .collect();
+    placement::place_checked(&model.arm()?, &views)
+}
+
+#[cfg(test)]
+#[path = "joints_tests.rs"]
+mod tests;

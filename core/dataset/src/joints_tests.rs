@@ -1,0 +1,157 @@
+use std::fmt::Write as _;
+use std::fs;
+
+use super::*;
+use crate::Dataset;
+use handeye_estimate::placement::DISTANCE_LIMIT_M;
+use handeye_geometry::frames::{Base, Pose, Tip};
+
+/// Degrees, as a person would copy them from a panel.
+const JOINTS_DEG: [[f64; 6]; 5] = [
+    [5.7, 40.1, -57.3, 5.7, 85.9, 11.5],
+    [22.9, 51.6, -68.8, 17.2, 63.0, -28.6],
+    [-17.2, 34.4, -45.8, -22.9, 103.1, 51.6],
+    [11.5, 63.0, -80.2, 34.4, 74.5, 19.1],
+    [40.1, 45.8, -63.0, -11.5, 91.7, 80.2],
+];
+
+fn radians(deg: &[f64; 6]) -> [f64; 6] {
+    deg.map(f64::to_radians)
+}
+
+/// Where a UR5 on a table with a tool has its tip.
+fn tip(joints_rad: &[f64; 6]) -> Pose<Base, Tip> {
+    let arm = ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in");
+    let foot = nalgebra::Isometry3::translation(0.1, 0.2, 0.8) * arm.base_from_first;
+    let tool = arm.flange_from_tip * nalgebra::Isometry3::translation(0.0, 0.02, 0.15);
+    arm.mounted(foot, tool).forward(joints_rad).expect("six joints")
+}
+
+/// A data set without images, with the lines of `[robot]` about joints and a table of joint angles.
+fn read(robot: &str, header: &str, joints: &[[f64; 6]]) -> Result<Dataset, String> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("write");
+    let mut table = format!("image,x,y,z,qx,qy,qz,qw{header}\n");
+    for (i, (deg, cells)) in JOINTS_DEG.iter().zip(joints).enumerate() {
+        let tip = tip(&radians(deg));
+        let (t, [x, y, z, w]) = (tip.translation(), tip.xyzw());
+        write!(table, "{i}.png,{},{},{},{x},{y},{z},{w}", t.x, t.y, t.z).expect("text");
+        for value in &cells[..header.matches(',').count()] {
+            write!(table, ",{value}").expect("text");
+        }
+        table.push('\n');
+    }
+    write("poses.csv", &table);
+    write("corners.csv", "image,column,row,u,v\n0.png,0,0,3,4\n");
+    write(
+        "dataset.toml",
+        &format!(
+            "mode = \"eye_in_hand\"\n[target]\nkind = \"chessboard\"\ncolumns = 4\nrows = 3\nsquare_m = 0.02\n\
+             corners = \"corners.csv\"\n[camera]\nfixed = false\nwidth = 640\nheight = 480\n[robot]\n\
+             poses = \"poses.csv\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"\n{robot}"
+        ),
+    );
+    Dataset::read(folder.path()).map_err(|e| e.to_string())
+}
+
+const SIX: &str = ",q1,q2,q3,q4,q5,q6";
+const UR5: &str = "joints = 6\njoint_unit = \"deg\"\n[robot.arm]\nkind = \"ur5_coppeliasim\"\n";
+
+#[test]
+fn joint_angles_and_an_arm_tell_how_the_tip_moves_with_each_joint() {
+    // The central difference is off by h²/6; the angles are printed to all digits.
+    const STEP: f64 = 1e-5;
+    let data = read(UR5, SIX, &JOINTS_DEG).expect("a data set");
+    let arm = data.arm.as_ref().expect("an arm");
+    assert!(arm.placement.as_ref().expect("it fits").rms_m() < 1e-9);
+    for (entry, deg) in data.entries.iter().zip(&JOINTS_DEG) {
+        let q = radians(deg);
+        assert_eq!(entry.joints_rad.as_deref(), Some(&q[..]));
+        for j in 0..6 {
+            let moved = |step: f64| {
+                let mut q = q;
+                q[j] += step;
+                handeye_geometry::se3::log((tip(&radians(deg)).inverse() * tip(&q)).isometry())
+            };
+            let difference = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+            assert!((difference - entry.tip_by_joint[j]).norm() < 1e-8, "joint {}", j + 1);
+        }
+    }
+}
+
+#[test]
+fn the_rows_of_an_arm_do_as_well_as_its_name() {
+    let dh = "joints = 6\njoint_unit = \"deg\"\n[robot.arm]\ndh = [\n\
+              [0, 1.5707963267948966, 0.07455, 0], [-0.4251, 0, 0, -1.5707963267948966], [-0.39215, 0, 0, 0],\n\
+              [0, 1.5707963267948966, 0.11, -1.5707963267948966], [0, -1.5707963267948966, 0.09475, 0],\n\
+              [0, 0, 0.07495, 0]]\n";
+    let (by_rows, by_name) = (read(dh, SIX, &JOINTS_DEG), read(UR5, SIX, &JOINTS_DEG));
+    for (a, b) in by_rows.expect("rows").entries.iter().zip(&by_name.expect("a name").entries) {
+        assert!(a.tip_by_joint.iter().zip(&b.tip_by_joint).all(|(a, b)| (a - b).norm() < 1e-9));
+        assert_eq!(a.tip_by_joint.len(), 6);
+    }
+}
+
+#[test]
+fn joint_angles_without_an_arm_are_kept_and_not_used() {
+    let data = read("joints = 6\njoint_unit = \"rad\"\n", SIX, &JOINTS_DEG.map(|deg| radians(&deg))).expect("read");
+    assert_eq!(data.arm, None);
+    assert_eq!(data.entries[1].joints_rad.as_deref(), Some(&radians(&JOINTS_DEG[1])[..]));
+    assert!(data.entries.iter().all(|entry| entry.tip_by_joint.is_empty()));
+}
+
+#[test]
+fn joint_angles_that_do_not_belong_to_the_poses_are_not_used_and_the_data_set_says_why() {
+    let mut swapped = JOINTS_DEG;
+    swapped.swap(1, 3);
+    let mut misread = JOINTS_DEG;
+    misread[2][3] += 10.0;
+    let turned = JOINTS_DEG.map(|deg| [deg[0], deg[1], -deg[2], deg[3], deg[4], deg[5]]);
+    for (what, joints) in [("two rows swapped", swapped), ("a digit misread", misread), ("a sign", turned)] {
+        let data = read(UR5, SIX, &joints).expect("it reads");
+        let why = data.arm.expect("an arm").placement.expect_err(what);
+        assert!(matches!(why, PlacementError::Foreign { .. }), "{what}: {why}");
+        assert!(data.entries.iter().all(|entry| entry.tip_by_joint.is_empty()), "{what}");
+        assert!(data.entries.iter().all(|entry| entry.joints_rad.is_some()), "{what}: kept");
+    }
+    // Rounded to half a degree the tip is off by 4 mm at most for each of the joints that are far from it.
+    let halves = JOINTS_DEG.map(|deg| deg.map(|value| (2.0 * value).round() / 2.0));
+    let data = read(UR5, SIX, &halves).expect("it reads");
+    let placement = data.arm.expect("an arm").placement.expect("half degrees will do");
+    assert!(placement.rms_m() > 1e-4 && placement.rms_m() < DISTANCE_LIMIT_M);
+}
+
+#[test]
+fn a_defect_of_the_joint_angles_is_named_with_its_row() {
+    /// Lines of `[robot]`, columns of joints, their angles, and what the message must say.
+    type Case = (&'static str, &'static str, [[f64; 6]; 5], &'static [&'static str]);
+    let mut huge = JOINTS_DEG;
+    huge[2][4] = 721.0;
+    let kind = "[robot.arm]\nkind = \"ur5\"\n";
+    let cases: [Case; 9] = [
+        (UR5, "", JOINTS_DEG, &["poses.csv, row 1", "\"q1\" is missing", "qw,q1,q2,q3,q4,q5,q6"]),
+        ("", SIX, JOINTS_DEG, &["poses.csv, row 1", "unknown column \"q1\""]),
+        (UR5, ",q1,q3,q2,q4,q5,q6", JOINTS_DEG, &["poses.csv, row 1", "another order"]),
+        (UR5, SIX, huge, &["poses.csv, row 4", "q5 = 721 deg", "joint_unit"]),
+        ("joints = 6\n", SIX, JOINTS_DEG, &["dataset.toml, row 17", "needs joint_unit"]),
+        ("joints = 13\njoint_unit = \"deg\"\n", SIX, JOINTS_DEG, &["dataset.toml, row 17", "joints = 13", "1 to 12"]),
+        (kind, SIX, JOINTS_DEG, &["dataset.toml, row 17", "needs joints"]),
+        (
+            "joints = 6\njoint_unit = \"deg\"\n[robot.arm]\nkind = \"ur6\"\n",
+            SIX,
+            JOINTS_DEG,
+            &["dataset.toml, row 20", "ur6", "`ur5`", "`ur5_coppeliasim`"],
+        ),
+        (
+            "joints = 5\njoint_unit = \"deg\"\n[robot.arm]\nkind = \"ur5\"\n",
+            ",q1,q2,q3,q4,q5",
+            JOINTS_DEG,
+            &["dataset.toml, row 19", "joints = 5", "has 6"],
+        ),
+    ];
+    for (robot, header, joints, expected) in cases {
+        let error = read(robot, header, &joints).expect_err(robot);
+        assert!(expected.iter().all(|part| error.contains(part)), "{error}");
+        assert!(!error.contains('\n'), "{error}");
+    }
+}

@@ -1,0 +1,44 @@
+//! The one way from a dataset folder to what a calibration is made from.
+
+use super::{CameraInput, Dataset};
+use handeye_estimate::{CameraKnowledge, Observations, ObservedView};
+use handeye_geometry::targets::observation::Corners;
+
+impl CameraInput {
+    /// What a data set or a session with this table, or without one, knows of its camera.
+    pub fn knowledge(camera: Option<&Self>) -> CameraKnowledge {
+        match camera {
+            None => CameraKnowledge::NOTHING,
+            Some(input) => match input.intrinsics {
+                Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),
+                start => CameraKnowledge::Estimate { model: input.model, start },
+            },
+        }
+    }
+}
+
+impl Dataset {
+    /// What was observed. Where the data set has a corner table, its corners count; elsewhere `detected` gives those of
+    /// an entry by its index, `None` when the target was not found in its image.
+    pub fn observations(&self, mut detected: impl FnMut(usize) -> Option<Corners>) -> Observations {
+        let views = self.entries.iter().enumerate().map(|(index, entry)| {
+            let corners = match &entry.corners {
+                Some(listed) => Some(listed.clone().into()).filter(|corners: &Corners| !corners.is_empty()),
+                None => detected(index),
+            };
+            ObservedView {
+                tip_by_joint: entry.tip_by_joint.clone(),
+                camera_from_target: entry.camera_from_target,
+                ..ObservedView::new(&entry.name, entry.base_from_tip, corners)
+            }
+        });
+        Observations {
+            mode: self.mode,
+            target: self.target,
+            // Only pose pairs come without a size, and they need none.
+            image_size: self.image_size.unwrap_or_default(),
+            camera: CameraInput::knowledge(self.camera.as_ref()),
+            views: views.collect(),
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Which error may be stated for a calibration.
+//!
+//! A covariance is true when the model is. Where the data support an explanation that the answer does not count on (a
+//! board of another size, a lens that was given wrongly, a board that slipped), the answer is off by what that
+//! explanation would move it; that is added to the error. Where the data contradict themselves no error is stated.
+
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+
+use crate::handeye::joint::SmallSample;
+use crate::uncertainty::quality::tip_error_95_at;
+use handeye_geometry::se3;
+
+/// Which error may be stated.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Claim {
+    /// The model explains the data: the error is that of its covariance.
+    AsModelled,
+    /// The data support explanations that the answer does not count on.
+    Moved(Vec<Alternative>),
+    /// The data contradict themselves: no error can be stated.
+    Nothing,
+}
+
+/// Where the hand-eye transform would be by an explanation that the answer does not count on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alternative {
+    /// `log(X⁻¹ X')` of the hand-eye transform `X` as it is and `X'` by the explanation, `[t; r]` in m and rad.
+    pub shift: Vector6<f64>,
+    /// Covariance of `X'`, right perturbation `[t; r]`.
+    pub covariance: Matrix6<f64>,
+}
+
+impl Alternative {
+    /// How far it moves a `point` (camera coordinates, metres), metres.
+    pub fn moved_m(&self, point: &Point3<f64>) -> f64 {
+        let shift: Isometry3<f64> = se3::exp(&self.shift);
+        (shift * point - point).norm()
+    }
+}
+
+impl Claim {
+    /// How far explanations that the answer does not count on would move a `point` (camera coordinates, metres), metres;
+    /// of several the one that moves it farthest. Zero where there is none.
+    pub fn moved_m(&self, point: &Point3<f64>) -> f64 {
+        match self {
+            Self::Moved(alternatives) => alternatives.iter().map(|a| a.moved_m(point)).fold(0.0, f64::max),
+            Self::AsModelled | Self::Nothing => 0.0,
+        }
+    }
+
+    /// The length that the error of a point in camera coordinates stays under with a probability of 95 %, metres, from
+    /// the covariance `[t; r]` of the hand-eye transform (right perturbation) and the law of its error; `None` when
+    /// nothing may be stated.
+    ///
+    /// An alternative adds how far it moves the point to the error that remains: that of the model, or that under the
+    /// alternative where it is larger, because what it moves is known only so well.
+    pub fn error_95_m(&self, covariance: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> Option<f64> {
+        self.parts_95_m(covariance, law, point).map(|(moved_m, rest_m)| moved_m + rest_m)
+    }
+
+    /// The two parts of that error: how far the explanation that makes it largest would move the point, and what remains.
+    pub fn parts_95_m(&self, covariance: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> Option<(f64, f64)> {
+        let modelled = tip_error_95_at(covariance, law, point);
+        match self {
+            Self::AsModelled => Some((0.0, modelled)),
+            Self::Nothing => None,
+            Self::Moved(alternatives) => {
+                let under =
+                    |a: &Alternative| (a.moved_m(point), tip_error_95_at(&a.covariance, law, point).max(modelled));
+                let larger = |a: (f64, f64), b: (f64, f64)| if b.0 + b.1 > a.0 + a.1 { b } else { a };
+                Some(alternatives.iter().map(under).fold((0.0, modelled), larger))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn isotropic(sigma_m: f64) -> Matrix6<f64> {
+        Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)) * sigma_m * sigma_m
+    }
+
+    #[test]
+    fn an_alternative_adds_what_it_moves_and_the_worst_of_several_counts() {
+        let point = Point3::new(0.0, 0.0, 0.5);
+        let along = |shift: Vector6<f64>, sigma_m| Alternative { shift, covariance: isotropic(sigma_m) };
+        // A turn of 0.02 rad about x moves the point by a centimetre, a shift along x by three millimetres.
+        let turned = along(Vector6::new(0.0, 0.0, 0.0, 0.02, 0.0, 0.0), 1e-5);
+        let moved = along(Vector6::new(3e-3, 0.0, 0.0, 0.0, 0.0, 0.0), 1e-3);
+        let error = |claim: &Claim| claim.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).expect("stated");
+        let (plain, wide) = (2.795e-4, 2.795e-3);
+        assert!((error(&Claim::AsModelled) - plain).abs() < 1e-6);
+        assert!((error(&Claim::Moved(vec![turned.clone()])) - (0.01 + plain)).abs() < 2e-6);
+        assert!((error(&Claim::Moved(vec![moved.clone()])) - (3e-3 + wide)).abs() < 2e-6);
+        let both = Claim::Moved(vec![moved, turned]);
+        assert!((error(&both) - (0.01 + plain)).abs() < 2e-6);
+        assert!((both.moved_m(&point) - 0.01).abs() < 1e-6);
+        let (moved, rest) = both.parts_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).expect("stated");
+        assert!((moved - 0.01).abs() < 1e-6 && moved + rest == error(&both), "the parts are those of one explanation");
+        assert!(Claim::Nothing.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).is_none());
+    }
+}

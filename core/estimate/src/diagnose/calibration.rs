@@ -1,0 +1,172 @@
+//! A calibration: a fit that was examined.
+//!
+//! A least-squares fit states the error that its own model has. Whether the data agree with that model it does not know, so a
+//! [`Fit`] states no error; looking for what contradicts it does, and yields the [`Calibration`] that states one. There is no
+//! other way to one (the feature `testing` has made-up ones).
+//!
+//! ```
+//! use handeye_estimate::diagnose::Calibration;
+//! use handeye_estimate::Fit;
+//!
+//! fn print(calibration: &Calibration) {
+//!     let fit: &Fit = calibration;
+//!     println!("residual {:?} px, error {:?} m", fit.rms_px, calibration.tip_error_95_m());
+//! }
+//! ```
+//!
+//! The fit has none:
+//!
+//! ```compile_fail
+//! use handeye_estimate::Fit;
+//!
+//! fn print(fit: &Fit) {
+//!     println!("residual {:?} px, error {:?} m", fit.rms_px, fit.tip_error_95_m());
+//! }
+//! ```
+
+use std::ops::Deref;
+
+use nalgebra::Point3;
+
+use super::doctor::{self, Diagnosis};
+use super::findings::FindingOptions;
+use crate::claim::Claim;
+use crate::handeye::HandEyeError;
+use crate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, resolution};
+use handeye_geometry::progress::Work;
+
+/// A fit, what was found about it, and the error that may be stated for it.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    pub(super) fit: Fit,
+    pub(super) claim: Claim,
+    pub(super) diagnosis: Diagnosis,
+}
+
+/// Calibrates from observations, and examines the answer.
+///
+/// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too. What it needs is said of [`estimate::fit`].
+///
+/// # Errors
+/// [`CalibrateError`] says what is missing and what to do; [`HandEyeError::Cancelled`] inside it when `work` was.
+pub fn calibrate<'a>(
+    observations: &Observations,
+    method: Method,
+    work: impl Into<Work<'a>>,
+) -> Result<Calibration, CalibrateError> {
+    calibrate_with(observations, method, Options::default(), &FindingOptions::default(), work)
+}
+
+/// As [`calibrate`], with options and what is wanted of the answer.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_with<'a>(
+    observations: &Observations,
+    method: Method,
+    options: Options,
+    wanted: &FindingOptions,
+    work: impl Into<Work<'a>>,
+) -> Result<Calibration, CalibrateError> {
+    let work = work.into();
+    let fit = estimate::fit_with(observations, method, options, work)?;
+    examine(observations, fit, wanted, work.cancel)
+}
+
+/// Examines a fit of these observations: what contradicts it, and which error may be stated in spite of that.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`]: half an examination states nothing.
+pub fn examine<'a>(
+    observations: &Observations,
+    fit: Fit,
+    wanted: &FindingOptions,
+    work: impl Into<Work<'a>>,
+) -> Result<Calibration, CalibrateError> {
+    let work = work.into();
+    let calibration = doctor::examined(observations, fit, wanted, &work);
+    if work.is_cancelled() { Err(HandEyeError::Cancelled.into()) } else { Ok(calibration) }
+}
+
+impl Calibration {
+    /// What was found.
+    pub fn diagnosis(&self) -> &Diagnosis {
+        &self.diagnosis
+    }
+
+    /// What was found, by itself.
+    pub fn into_diagnosis(self) -> Diagnosis {
+        self.diagnosis
+    }
+
+    /// Which error may be stated.
+    pub fn claim(&self) -> &Claim {
+        &self.claim
+    }
+
+    /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
+    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. Of the joint estimate
+    /// only, and `None` when the data contradict themselves.
+    pub fn tip_error_95_m(&self) -> Option<f64> {
+        self.error_95_m(&self.joint.as_ref()?.reference_point)
+    }
+
+    /// The same at any `point`, camera coordinates in metres.
+    pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
+        self.claim.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
+    }
+
+    /// How far what was found and the answer does not count on would move a point where the camera saw the target, metres: a
+    /// part of [`Self::tip_error_95_m`]. `None` where nothing of the kind was found, or nothing may be stated.
+    pub fn moved_m(&self) -> Option<f64> {
+        let joint = self.joint.as_ref()?;
+        let (covariance, law) = (self.hand_eye_covariance()?, joint.small_sample);
+        let (moved_m, _) = self.claim.parts_95_m(covariance, law, &joint.reference_point)?;
+        (moved_m >= resolution::PLACE_M).then_some(moved_m)
+    }
+
+    /// The error where the camera saw the target by the noise alone, as if the model were true whatever was found, 95 %, metres.
+    pub fn modelled_error_95_m(&self) -> Option<f64> {
+        self.fit.modelled_error_95_m()
+    }
+
+    /// The same at any `point`, camera coordinates in metres.
+    pub fn modelled_error_95_at(&self, point: &Point3<f64>) -> Option<f64> {
+        self.fit.modelled_error_95_at(point)
+    }
+}
+
+impl Deref for Calibration {
+    type Target = Fit;
+
+    fn deref(&self) -> &Fit {
+        &self.fit
+    }
+}
+
+/// Made up for tests of what is shown of a calibration.
+#[cfg(any(test, feature = "testing"))]
+mod made_up {
+    use std::ops::DerefMut;
+
+    use super::{Calibration, Claim, Diagnosis, Fit};
+
+    impl Calibration {
+        /// As if nothing had been found.
+        pub fn as_modelled(fit: Fit) -> Self {
+            Self { fit, claim: Claim::AsModelled, diagnosis: Diagnosis::default() }
+        }
+
+        /// With another error that may be stated.
+        #[must_use]
+        pub fn claiming(self, claim: Claim) -> Self {
+            Self { claim, ..self }
+        }
+    }
+
+    impl DerefMut for Calibration {
+        fn deref_mut(&mut self) -> &mut Fit {
+            &mut self.fit
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! What is wrong with a session: hypotheses about the data, each with how much better it explains them.
+//!
+//! # What it tests
+//! Gross faults of how poses were written down ([`gross`]): inverted poses or the wrong mode (the same equations),
+//! millimetres against metres, the order of quaternions, images and poses out of step. Then, in a linear Gaussian model of
+//! pose pairs ([`model`]): a target that is not of its stated size or is bent, intrinsics that do not fit, a target or a
+//! camera that moved during the session, the zero of a joint, views that contradict the others.
+//!
+//! # How it decides
+//! A gross fault is accused when it brings the board together at least three times better, and to within a twentieth
+//! of its distance. The others are fitted with noise levels of their own and judged by the F test with allowance for the
+//! number of alternatives, by a size that matters, and, where they change the model, by views held out. Errors of the robot
+//! that depend on where it stands ([`RobotField`](crate::handeye::joint::RobotField)) are part of every fit. What is accepted becomes a finding. Nothing is ever
+//! applied.
+//!
+//! # Needs
+//! Four views for gross faults and five for the others, with robot turns about two axes; where that is missing
+//! [`Diagnosis::untested`] says so, and the findings say what is. Views out of the fit count for nothing. Of more than
+//! [`MOST_VIEWS`] views so many are examined, spread over the session.
+
+pub mod agreement;
+mod claim;
+mod effect;
+mod gross;
+mod judge;
+mod model;
+mod pairing;
+mod report;
+mod screen;
+mod select;
+pub mod views;
+mod weight;
+mod words;
+
+use serde::Serialize;
+
+use crate::claim::Claim;
+use crate::diagnose::Calibration;
+use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
+use crate::{Fit, Observations};
+use handeye_geometry::progress::Work;
+use handeye_geometry::targets::observation;
+use handeye_wording::Text;
+
+pub use report::Detail;
+
+/// A hypothesis about the data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hypothesis {
+    /// What it says.
+    pub code: FindingCode,
+    /// What it says besides, when several things have to be changed together, or what explains the data just as well
+    /// (inverted poses and the other mode are the same equations).
+    pub with: Vec<FindingCode>,
+    /// It in words, with what it explains.
+    #[serde(serialize_with = "Text::serialize_english")]
+    pub text: Text,
+    /// What to do if it is true.
+    #[serde(serialize_with = "Text::serialize_english")]
+    pub advice: Text,
+    /// Natural logarithm of how many times better it explains the data than they are explained without it; negative when
+    /// it explains them worse.
+    pub gain: f64,
+    /// What it estimates, and one standard deviation.
+    pub estimate: Option<Estimate>,
+    /// The numbers behind it.
+    pub evidence: Vec<Evidence>,
+    /// The views concerned, by name; for a move the first view after it.
+    pub views: Vec<String>,
+    /// Whether chance is ruled out.
+    pub significant: bool,
+    /// Whether it is also large enough to matter, better on views held out, and not explained by one that explains more.
+    /// It is then among the findings.
+    pub accepted: bool,
+    /// Whether the calibration counts on it: a bend or a size that was estimated, views that are left out.
+    pub applied: bool,
+}
+
+impl Hypothesis {
+    /// It in words, with what to do.
+    fn text_with_advice(&self) -> Text {
+        Text::sentences([self.text.clone(), self.advice.clone()])
+    }
+}
+
+/// A number that a hypothesis estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// What it is.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// One standard deviation; `None` where none is known.
+    pub sigma: Option<f64>,
+    /// Its unit; empty for a ratio.
+    pub unit: &'static str,
+}
+
+/// The diagnosis of a session.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Diagnosis {
+    /// Everything found, the most severe first; accepted hypotheses are among them.
+    pub findings: Vec<Finding>,
+    /// What was tested: accepted hypotheses in the order of their weight, then the best of every other kind.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Why hypotheses could not be tested; `None` when they were.
+    pub untested: Option<String>,
+}
+
+impl Diagnosis {
+    /// Whether nothing was found that may spoil the answer.
+    pub fn is_healthy(&self) -> bool {
+        self.untested.is_none() && self.findings.iter().all(|f| f.severity < Severity::Warning)
+    }
+
+    /// The diagnosis as a page of text. It ends with a newline.
+    pub fn report(&self, detail: Detail) -> String {
+        report::text(self, detail)
+    }
+}
+
+/// Views that are examined at the most: the noise levels are then known to a few percent, and more would tell no more.
+pub const MOST_VIEWS: usize = 400;
+/// Largest noise of a robot, metres and radians per axis, that is taken for an arm's. Real sets of good arms show 0.2
+/// to 0.5 mm and 0.04° to 0.12°; four times as much has another reason.
+const PLAUSIBLE: (f64, f64) = (2e-3, 8.4e-3);
+/// A misfit beyond this part of the board's distance is beyond the linear model.
+const HOPELESS: f64 = 0.2;
+
+/// What is wrong with observations of which there is no fit, or whose fit does not matter: the hypotheses do not depend on it.
+///
+/// `work` is a `&CancelToken`, or a [`Work`]; when it is cancelled [`Diagnosis::untested`] says so.
+pub fn diagnose<'a>(observations: &Observations, options: &FindingOptions, work: impl Into<Work<'a>>) -> Diagnosis {
+    let mut diagnosis = Diagnosis::default();
+    if let Err(why) = examine(observations, None, &mut diagnosis, &work.into()) {
+        diagnosis.untested = Some(why);
+    }
+    diagnosis.with(findings::findings(observations, None, options))
+}
+
+/// What is wrong with observations and their fit, and which error may be stated for it. Only half of it when `work` is cancelled.
+pub(super) fn examined(
+    observations: &Observations,
+    fit: Fit,
+    options: &FindingOptions,
+    work: &Work<'_>,
+) -> Calibration {
+    let repaired = as_found(observations, &fit);
+    let observations = repaired.as_ref().unwrap_or(observations);
+    let mut diagnosis = Diagnosis::default();
+    let mut found = (&fit, Claim::AsModelled);
+    if let Err(why) = examine(observations, Some(&mut found), &mut diagnosis, work) {
+        diagnosis.untested = Some(why);
+    }
+    let (_, claim) = found;
+    let mut claim = claim::with_open_size(claim::with_own_lens(claim, &fit), &fit);
+    if diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem) {
+        claim = Claim::Nothing;
+    }
+    let calibration = Calibration { fit, claim, diagnosis: Diagnosis::default() };
+    // After the claim: the goal is judged by it.
+    let of_estimate = findings::findings(observations, Some(&calibration), options);
+    Calibration { diagnosis: diagnosis.with(of_estimate), ..calibration }
+}
+
+impl Diagnosis {
+    /// With what the estimate says. It comes before what was examined, so that what the estimate has already acted upon is said as
+    /// the estimate says it, and said once.
+    fn with(mut self, of_estimate: Vec<Finding>) -> Self {
+        self.findings.splice(0..0, of_estimate);
+        let mut said: Vec<FindingCode> = Vec::new();
+        self.findings.retain(|finding| {
+            let once =
+                matches!(finding.code, FindingCode::OutlierView | FindingCode::BoardBent | FindingCode::OutlierCorners);
+            let new = !(once && said.contains(&finding.code));
+            said.push(finding.code);
+            new
+        });
+        findings::sort(&mut self.findings);
+        self
+    }
+}
+
+/// The observations with the corners numbered as the calibration found them to be, and where they would be if the target were
+/// printed as drawn; `None` when that changes nothing.
+fn as_found(observations: &Observations, calibration: &Fit) -> Option<Observations> {
+    let print = calibration.joint.as_ref().and_then(|joint| joint.print.as_ref()).zip(calibration.intrinsics());
+    if print.is_none() && calibration.views.iter().all(|view| view.quarter_turns == 0) {
+        return None;
+    }
+    let points = observations.target.points();
+    let mut observations = observations.clone();
+    for (view, result) in observations.views.iter_mut().zip(&calibration.views) {
+        let Some(corners) = view.corners.as_mut() else { continue };
+        if result.quarter_turns != 0 {
+            observation::renumber(corners, &mut view.depth, &observations.target, result.quarter_turns);
+        }
+        let Some(((print, lens), pose)) = print.zip(result.camera_from_target) else { continue };
+        for corner in corners {
+            let drawn = points[corner.index];
+            let printed = drawn + print.errors_m[corner.index].push(0.0);
+            let [drawn, printed] = [drawn, printed].map(|point| lens.project(&(pose.isometry() * point)));
+            if let (Ok(drawn), Ok(printed)) = (drawn, printed) {
+                corner.px += drawn - printed;
+            }
+        }
+    }
+    Some(observations)
+}
+
+fn examine(
+    observations: &Observations,
+    fit: Option<&mut (&Fit, Claim)>,
+    diagnosis: &mut Diagnosis,
+    work: &Work<'_>,
+) -> Result<(), String> {
+    let cancelled = || "cancelled".to_owned();
+    let (calibration, claim) = fit.map(|(fit, claim)| (*fit, claim)).unzip();
+    let lens = calibration.and_then(|calibration| calibration.lens_by_corners);
+    let sight = views::SessionViews::new(observations, lens).map_err(|why| why.to_string())?;
+    diagnosis.findings.extend(words::not_finite(&sight));
+    diagnosis.findings.extend(words::wrong_corners(&sight));
+    let views = sight.views.len();
+    if views < gross::NEED {
+        return Err(format!("views with the target and a robot pose: {views}, {} are needed", gross::NEED));
+    }
+    if let Some(behind) = words::behind_the_camera(&sight) {
+        diagnosis.findings.push(behind);
+        return Ok(());
+    }
+    let gross = gross::gross(&sight, work).ok_or_else(cancelled)?;
+    diagnosis.hypotheses = words::gross(&sight, &gross);
+    if gross.accused {
+        diagnosis.findings.extend(words::gross_findings(&diagnosis.hypotheses));
+        return Ok(());
+    }
+    let start = gross.as_given.map_err(|error| error.to_string())?;
+    if start.median_m > HOPELESS * sight.distance_m {
+        diagnosis.findings.push(words::hopeless(&sight, start.median_m));
+        return Ok(());
+    }
+    if views < select::NEED {
+        return Err(format!("views with the target and a robot pose: {views}, {} are needed", select::NEED));
+    }
+    let selection = select::select(&sight, &start, work).ok_or_else(|| {
+        if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }
+    })?;
+    let size = calibration.and_then(|calibration| calibration.joint.as_ref()?.size.as_ref());
+    let selection = match size {
+        Some(size) => selection.with_size(size),
+        None => selection,
+    };
+    let mut fine = words::fine(&selection);
+    if let Some(calibration) = calibration {
+        for h in &mut fine {
+            h.applied = claim::is_applied(calibration, h);
+        }
+    }
+    let noise = calibration.and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
+    if let Some((calibration, claim)) = calibration.zip(claim) {
+        *claim = claim::claim(&selection, calibration);
+    }
+    diagnosis.findings.extend(fine.iter().filter(|h| h.accepted).map(words::finding_of));
+    let beside = fine.iter().any(|h| h.accepted && !h.applied);
+    // Where nothing else was found that is the noise that the answer states: one report has one number for it.
+    let (robot_m, robot_rad) = match noise.filter(|_| !beside) {
+        // What depends on the place of the arm is its error as much as what scatters.
+        Some(noise) => (noise.robot_m.hypot(noise.field_m), noise.robot_rad.hypot(noise.field_rad)),
+        None => selection.fit.robot_sigma(),
+    };
+    if robot_m > PLAUSIBLE.0 || robot_rad > PLAUSIBLE.1 {
+        diagnosis.findings.push(words::implausible(robot_m, robot_rad, beside));
+    }
+    // What was not accepted is listed by its weight.
+    let gross = std::mem::take(&mut diagnosis.hypotheses);
+    diagnosis.hypotheses = fine;
+    diagnosis.hypotheses.extend(gross);
+    diagnosis.hypotheses.sort_by(|a, b| {
+        b.accepted.cmp(&a.accepted).then(
+            // Accepted ones stay in the order in which they were taken in.
+            if a.accepted && b.accepted { std::cmp::Ordering::Equal } else { b.gain.total_cmp(&a.gain) },
+        )
+    });
+    if selection.is_ended {
+        return Err(format!(
+            "so much is wrong that the examination was ended after {} findings: mend them and examine the session again for more",
+            selection.taken.len()
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,526 @@
+//! The linear Gaussian model of pose pairs, and what hypotheses do in it.
+//!
+//! For view `i` let `e_i = log(C_i⁻¹ · chain_i)`, the target's pose by the chain against the one seen, both at a
+//! solution that is nearly right. To first order
+//!
+//! `r_i = e_i + A_i x + y + B_i f + Σ h_i θ_h`,  `r_i ~ N(0, Σ_i + robot_m² Q_i^t + robot_rad² Q_i^r)`
+//!
+//! with `x`, `y` the corrections of hand-eye and target, `f` those of lens and warp (with the information that the
+//! corners hold on them apart from the poses), `Σ_i` the covariance of the seen pose by corner noise, `Q_i = D_i D_iᵀ`
+//! the robot's noise brought into the target's frame, and `h_i` the column of a hypothesis. The noise levels are found
+//! by Fisher scoring on the restricted likelihood, under every hypothesis anew. A hypothesis with `q` numbers is judged
+//! by Wald's statistic `W = θᵀ Cov(θ)⁻¹ θ` against the F distribution.
+//!
+//! Reference: Patterson & Thompson 1971 (restricted likelihood); Cook & Weisberg 1982 (deletion of cases).
+
+use std::cell::Cell;
+use std::ops::Range;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use super::effect::Effect;
+use super::views::SessionViews;
+use crate::handeye::closed_form::ClosedFormSolution;
+use crate::handeye::joint::chain::Chain;
+use crate::handeye::joint::field::{self, HALF, Places, SLOPES};
+use crate::resolution;
+use handeye_geometry::se3;
+use handeye_geometry::statistics::pooled_freedom;
+
+/// Parts of the field, each with a level: errors of position and of orientation in the axes of the tip, and in those of the
+/// base.
+const PARTS: usize = 4;
+/// Smallest noise levels of the robot, m and rad: nothing is judged by less.
+const LEAST: [f64; 2] = [resolution::PLACE_M, resolution::ANGLE_RAD];
+/// Smallest levels of the field, m and rad: below it nothing changes now.
+const LEAST_FIELD: f64 = 1e-6;
+/// Largest change of a variance in one step, as a logarithm.
+const LARGEST_STEP: f64 = 2.0;
+const MAX_STEPS: usize = 25;
+/// Relative change of both variances that ends the search.
+const SETTLED: f64 = 1e-2;
+/// Slopes of the field that the data have to determine, together, for there to be one. It then explains about as much as
+/// a tenth of one more unknown would.
+const LEAST_DETERMINED: f64 = 0.1;
+/// Information on the logarithm of a variance of the field below which it changes nothing: its effects then stand out of
+/// the noise by a thirtieth.
+const NO_FIELD: f64 = 1e-3;
+
+/// One view in the linear model.
+#[derive(Clone)]
+pub(super) struct Row {
+    pub error: Vector6<f64>,
+    pub by_hand_eye: Matrix6<f64>,
+    pub by_robot: Matrix6<f64>,
+    camera: Matrix6<f64>,
+    robot: [Matrix6<f64>; 2],
+}
+
+/// All views at a solution.
+pub(super) struct Model<'a> {
+    pub sight: &'a SessionViews,
+    pub solution: ClosedFormSolution,
+    pub rows: Vec<Row>,
+    /// Where the errors of the robot that depend on where it stands are taken, where there are any.
+    pub field: Option<Places>,
+    /// Whether the field has a part in the axes of the base.
+    in_base: bool,
+    /// Work that was done with it and with models that were made of it, in elements of normal equations that a view was added to:
+    /// what an examination costs, by a count that is the same on every machine.
+    work: Rc<Cell<u64>>,
+}
+
+/// Variances of the robot per axis, of position (m²) and of orientation (rad²).
+#[derive(Clone, Copy)]
+pub(super) struct Levels {
+    /// Of its noise, view by view.
+    pub noise: [f64; 2],
+    /// Of what depends on where it stands, at a typical place: in the axes of the tip, then in those of the base.
+    pub field: [f64; PARTS],
+}
+
+impl Levels {
+    /// With as much of the one as of the other.
+    pub fn even(noise: [f64; 2]) -> Self {
+        Self { noise, field: [noise[0], noise[1], noise[0], noise[1]] }
+    }
+}
+
+/// Which views and effects are in a fit.
+#[derive(Clone, Default)]
+pub(super) struct State {
+    pub effects: Vec<Effect>,
+    /// Outlier views.
+    pub aside: Vec<usize>,
+}
+
+/// The result of a fit.
+pub(super) struct Fit {
+    /// `[x (6), y (6), lens if free, slopes of the field if there is one, numbers of the effects…]`
+    pub theta: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    pub levels: Levels,
+    /// Unknowns that the data determine: a slope of the field that follows its prior counts for less than one.
+    pub determined: f64,
+    /// Residual of every view, those aside included.
+    pub residuals: Vec<Vector6<f64>>,
+    pub weights: Vec<Matrix6<f64>>,
+    /// Columns per view.
+    pub designs: Vec<DMatrix<f64>>,
+    /// Views in the fit.
+    pub views: usize,
+    /// Places of the field's slopes among the unknowns, in the order of their levels.
+    slopes: [Range<usize>; PARTS],
+}
+
+impl<'a> Model<'a> {
+    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution, field: Option<Places>) -> Self {
+        let rows = sight
+            .views
+            .iter()
+            .map(|view| {
+                let chain = Chain::new(
+                    sight.mode,
+                    &view.base_from_tip,
+                    &Vector6::zeros(),
+                    &solution.mount_from_camera,
+                    &solution.anchor_from_target,
+                );
+                let seen = nearer(sight, view, &chain.camera_from_target);
+                let (t, r) = (chain.by_correction.fixed_columns::<3>(0), chain.by_correction.fixed_columns::<3>(3));
+                Row {
+                    error: se3::log(&(seen.inverse() * chain.camera_from_target)),
+                    by_hand_eye: chain.by_hand_eye,
+                    by_robot: chain.by_correction,
+                    camera: view.covariance,
+                    robot: [t * t.transpose(), r * r.transpose()],
+                }
+            })
+            .collect();
+        Self { sight, solution, rows, field, in_base: false, work: Rc::default() }
+    }
+
+    /// The same with a field that has a part in the axes of the base, too; `None` where there is none to be had.
+    ///
+    /// What is wrong near the wrist turns with the tip. What is wrong near the base does not: links that are too long make the
+    /// arm move too far, which a field in the axes of the tip cannot follow where the tip turns, and looks like another
+    /// size of the target, or like a move. An effect beside both parts is more than that.
+    pub fn with_field_in_base(&self) -> Option<Self> {
+        let field = Places::for_field(self.sight.views.iter().map(|view| &view.base_from_tip))?;
+        let (sight, solution, rows, work) = (self.sight, self.solution, self.rows.clone(), Rc::clone(&self.work));
+        Some(Self { sight, solution, rows, field: Some(field), in_base: true, work })
+    }
+
+    /// The same views at the solution that a fit found.
+    pub fn moved(&self, fit: &Fit) -> Self {
+        let step = |at: usize| Vector6::from_iterator(fit.theta.rows(at, 6).iter().copied());
+        let solution = ClosedFormSolution {
+            mount_from_camera: self.solution.mount_from_camera.perturbed(&step(0)),
+            anchor_from_target: self.solution.anchor_from_target.perturbed(&step(6)),
+        };
+        Self { work: Rc::clone(&self.work), ..Self::new(self.sight, solution, self.field) }
+    }
+
+    /// Takes account of normal equations of so many unknowns that every view was added to.
+    pub fn count_work(&self, width: usize) {
+        self.work.set(self.work.get() + (self.rows.len() * width * width) as u64);
+    }
+
+    /// The work so far.
+    pub fn work(&self) -> u64 {
+        self.work.get()
+    }
+
+    /// Mean squared displacement of the board by a residual, as a length, metres.
+    pub fn displacement_m(&self, residual: &Vector6<f64>) -> f64 {
+        (residual.transpose() * self.sight.displacement * residual)[0].max(0.0).sqrt()
+    }
+
+    /// First column of the field.
+    fn field_at(&self) -> usize {
+        12 + if self.sight.lens_free { self.sight.lens_count() } else { 0 }
+    }
+
+    /// First column of the effects.
+    pub fn effects_at(&self) -> usize {
+        self.field_at() + self.slopes()
+    }
+
+    /// Whether a fit found that errors depend on where the robot stands: the data determine a part of the slopes.
+    pub fn has_field(&self, fit: &Fit) -> bool {
+        fit.determined > (fit.width() - self.slopes()) as f64 + LEAST_DETERMINED
+    }
+
+    fn slopes(&self) -> usize {
+        match (&self.field, self.in_base) {
+            (None, _) => 0,
+            (Some(_), false) => SLOPES,
+            (Some(_), true) => 2 * SLOPES,
+        }
+    }
+
+    fn design(&self, index: usize, state: &State, width: usize) -> DMatrix<f64> {
+        let (row, view) = (&self.rows[index], &self.sight.views[index]);
+        let mut design = DMatrix::zeros(6, width);
+        design.view_mut((0, 0), (6, 6)).copy_from(&row.by_hand_eye);
+        design.view_mut((0, 6), (6, 6)).fill_with_identity();
+        let mut at = 12;
+        if self.sight.lens_free {
+            let lens = self.sight.lens_count();
+            design.view_mut((0, at), (6, lens)).copy_from(&view.by_form.columns(0, lens));
+            at += lens;
+        }
+        if let Some(places) = &self.field {
+            let place = places.at(&view.base_from_tip);
+            let tip_from_base = view.base_from_tip.isometry().rotation.inverse().to_rotation_matrix();
+            let mut turned = Matrix6::zeros();
+            for part in [0, 3] {
+                turned.fixed_view_mut::<3, 3>(part, part).copy_from(tip_from_base.matrix());
+            }
+            for by_error in [row.by_robot, row.by_robot * turned].iter().take(if self.in_base { 2 } else { 1 }) {
+                let columns = field::columns(&place, by_error);
+                design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
+                at += columns.ncols();
+            }
+        }
+        for effect in &state.effects {
+            let columns = effect.columns(self, index);
+            design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
+            at += columns.ncols();
+        }
+        design
+    }
+
+    fn width(&self, state: &State) -> usize {
+        self.effects_at() + state.effects.iter().map(|e| e.numbers(self.sight.lens_count())).sum::<usize>()
+    }
+
+    /// Places of the form's columns among the unknowns.
+    fn form_places(&self, state: &State) -> Vec<(usize, usize)> {
+        let lens = self.sight.lens_count();
+        let mut places: Vec<(usize, usize)> =
+            if self.sight.lens_free { (0..lens).map(|i| (12 + i, i)).collect() } else { Vec::new() };
+        let mut at = self.effects_at();
+        for effect in &state.effects {
+            places.extend(effect.form_columns(lens).into_iter().enumerate().map(|(k, i)| (at + k, i)));
+            at += effect.numbers(lens);
+        }
+        places
+    }
+
+    /// Adds what the corners say of lens and warp apart from the poses.
+    fn add_form(&self, state: &State, normal: &mut DMatrix<f64>, right: &mut DVector<f64>) {
+        let places = self.form_places(state);
+        for &(i, a) in &places {
+            right[i] -= self.sight.form_gradient[a];
+            for &(j, b) in &places {
+                normal[(i, j)] += self.sight.form_information[(a, b)];
+            }
+        }
+    }
+
+    /// Noise levels and unknowns of a state. `None` when the views leave something open.
+    pub fn fit(&self, state: &State, start: Levels) -> Option<Fit> {
+        let width = self.width(state);
+        let inside: Vec<usize> = (0..self.rows.len()).filter(|i| !state.aside.contains(i)).collect();
+        if 6 * inside.len() <= width - self.slopes() {
+            return None;
+        }
+        let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
+        let least: [f64; 2 + PARTS] = std::array::from_fn(|k| LEAST.get(k).copied().unwrap_or(LEAST_FIELD).powi(2));
+        let mut levels = Levels {
+            noise: std::array::from_fn(|k| start.noise[k].max(least[k])),
+            field: std::array::from_fn(|k| start.field[k].max(least[LEAST.len() + k])),
+        };
+        for step in 0..=MAX_STEPS {
+            self.count_work(width);
+            let solved = self.solve(state, &inside, &designs, levels)?;
+            if step == MAX_STEPS {
+                return Some(self.finished(solved, levels, designs, &inside));
+            }
+            let of_noise = self.scoring(&inside, &designs, &solved, levels.noise);
+            let of_field = self.scoring_of_field(&solved, levels.field);
+            let mut settled = true;
+            let changes = of_noise.into_iter().chain(of_field);
+            for ((v, least), c) in levels.noise.iter_mut().chain(&mut levels.field).zip(least).zip(changes) {
+                settled &= c.abs() < SETTLED || (c < 0.0 && *v <= least);
+                *v = (*v * c.exp()).max(least);
+            }
+            if settled {
+                return Some(self.finished(solved, levels, designs, &inside));
+            }
+        }
+        None
+    }
+
+    fn weight(&self, index: usize, robot: [f64; 2]) -> Option<Matrix6<f64>> {
+        let row = &self.rows[index];
+        (row.camera + row.robot[0] * robot[0] + row.robot[1] * robot[1]).try_inverse()
+    }
+
+    fn solve(&self, state: &State, inside: &[usize], designs: &[DMatrix<f64>], levels: Levels) -> Option<Solution> {
+        let width = designs.first()?.ncols();
+        let weights: Vec<Matrix6<f64>> =
+            (0..self.rows.len()).map(|i| self.weight(i, levels.noise)).collect::<Option<_>>()?;
+        let mut normal = DMatrix::zeros(width, width);
+        let mut right = DVector::zeros(width);
+        for &i in inside {
+            let weighted = weights[i] * &designs[i];
+            normal.gemm_tr(1.0, &designs[i], &weighted, 1.0);
+            right.gemv_tr(-1.0, &weighted, &self.rows[i].error, 1.0);
+        }
+        self.add_form(state, &mut normal, &mut right);
+        for (part, level) in self.field_parts().into_iter().zip(levels.field) {
+            part.for_each(|i| normal[(i, i)] += level.recip());
+        }
+        let covariance = inverse(&normal)?;
+        let theta = &covariance * &right;
+        theta.iter().all(|v| v.is_finite()).then_some(Solution { weights, covariance, theta })
+    }
+
+    /// Places of the field's slopes among the unknowns, in the order of their levels.
+    fn field_parts(&self) -> [Range<usize>; PARTS] {
+        let (first, end) = (self.field_at(), self.effects_at());
+        [0, 1, 2, 3].map(|k| {
+            let at = |k: usize| (first + k * HALF).min(end);
+            at(k)..at(k + 1)
+        })
+    }
+
+    /// Logarithmic step of the variances of the field: Fisher scoring on the restricted likelihood, in which
+    /// `Zᵀ P Z = (1 - C / v) / v` for effects with the variance `v` and the covariance `C` after the fit.
+    fn scoring_of_field(&self, solved: &Solution, levels: [f64; PARTS]) -> [f64; PARTS] {
+        let parts = self.field_parts();
+        let mut gradient = nalgebra::SVector::<f64, PARTS>::zeros();
+        let mut information = nalgebra::SMatrix::<f64, PARTS, PARTS>::zeros();
+        for (k, part) in parts.iter().enumerate() {
+            for (l, other) in parts.iter().enumerate() {
+                let mut known = DMatrix::zeros(part.len(), other.len());
+                if k == l {
+                    known.fill_with_identity();
+                }
+                let within = (levels[k] * levels[l]).sqrt();
+                known -= solved.covariance.view((part.start, other.start), known.shape()) / within;
+                if k == l {
+                    let squares = solved.theta.rows(part.start, part.len()).norm_squared();
+                    gradient[k] = 0.5 * (squares / levels[k] - known.trace());
+                }
+                information[(k, l)] = 0.5 * known.norm_squared();
+            }
+        }
+        for k in 0..PARTS {
+            // What does not show beside the noise is none.
+            if information[(k, k)] < NO_FIELD {
+                information.fill_row(k, 0.0);
+                information.fill_column(k, 0.0);
+                (gradient[k], information[(k, k)]) = (0.0, 1.0);
+            }
+            // Axes of tip and base are the same where the tip hardly turns: nothing then tells which it is.
+            information[(k, k)] *= 1.0 + 1e-3;
+        }
+        let step = information.try_inverse().map_or_else(|| gradient * 0.0, |inverse| inverse * gradient);
+        [0, 1, 2, 3].map(|k: usize| step[k].clamp(-LARGEST_STEP, LARGEST_STEP))
+    }
+
+    fn residual(&self, index: usize, design: &DMatrix<f64>, theta: &DVector<f64>) -> Vector6<f64> {
+        let by_unknowns = design * theta;
+        self.rows[index].error + Vector6::from_iterator(by_unknowns.iter().copied())
+    }
+
+    /// Logarithmic step of both variances.
+    fn scoring(&self, inside: &[usize], designs: &[DMatrix<f64>], solved: &Solution, robot: [f64; 2]) -> [f64; 2] {
+        let mut gradient = [0.0; 2];
+        let mut information = nalgebra::Matrix2::zeros();
+        for &i in inside {
+            let weight = &solved.weights[i];
+            let weighted_residual = weight * self.residual(i, &designs[i], &solved.theta);
+            let weighted = weight * &designs[i];
+            let shared = &weighted * &solved.covariance * weighted.transpose();
+            let by_level = [0, 1].map(|j| weight * self.rows[i].robot[j]);
+            for j in 0..2 {
+                let q = &self.rows[i].robot[j];
+                let squares = (weighted_residual.transpose() * q * weighted_residual)[0];
+                let expected = by_level[j].trace() - (shared * q).trace();
+                gradient[j] += 0.5 * (squares - expected);
+                for k in 0..2 {
+                    information[(j, k)] += 0.5 * (by_level[j] * by_level[k]).trace();
+                }
+            }
+        }
+        let mut scaled = nalgebra::Vector2::zeros();
+        for j in 0..2 {
+            scaled[j] = gradient[j] * robot[j];
+            for k in 0..2 {
+                information[(j, k)] *= robot[j] * robot[k];
+            }
+            // A level that does not show has no information; it then goes down slowly.
+            information[(j, j)] += 1e-6;
+        }
+        let step = information.try_inverse().map_or_else(|| scaled * 0.1, |inverse| inverse * scaled);
+        [0, 1].map(|j: usize| step[j].clamp(-LARGEST_STEP, LARGEST_STEP))
+    }
+
+    fn finished(&self, solved: Solution, levels: Levels, designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
+        let Solution { weights, covariance, theta } = solved;
+        let parts = self.field_parts().into_iter().zip(levels.field);
+        let by_prior: f64 = parts.map(|(part, level)| part.map(|i| covariance[(i, i)] / level).sum::<f64>()).sum();
+        let determined = theta.len() as f64 - by_prior;
+        let residuals = designs.iter().enumerate().map(|(i, design)| self.residual(i, design, &theta)).collect();
+        let (views, slopes) = (inside.len(), self.field_parts());
+        Fit { theta, covariance, levels, determined, residuals, weights, designs, views, slopes }
+    }
+}
+
+struct Solution {
+    weights: Vec<Matrix6<f64>>,
+    covariance: DMatrix<f64>,
+    theta: DVector<f64>,
+}
+
+/// The pose seen, or its mirrored twin where the corners cannot tell and the chain can.
+fn nearer(
+    sight: &SessionViews,
+    view: &super::views::SessionView,
+    chain: &nalgebra::Isometry3<f64>,
+) -> nalgebra::Isometry3<f64> {
+    let off = |pose: &nalgebra::Isometry3<f64>| super::agreement::misfit(&sight.outer, chain, pose);
+    match &view.alternative {
+        Some(other) if off(other) < off(&view.camera_from_target) => *other,
+        _ => view.camera_from_target,
+    }
+}
+
+/// Inverse of a positive definite matrix of unlike units; `None` when it is singular.
+pub(super) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { f64::NAN });
+    let n = matrix.nrows();
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let cholesky = scaled.cholesky()?;
+    // Of unit diagonal, so a pivot near the rounding means that columns depend on each other.
+    if cholesky.l_dirty().diagonal().min() < 1e-7 {
+        return None;
+    }
+    let inverse = cholesky.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+impl Fit {
+    /// Unknowns.
+    pub fn width(&self) -> usize {
+        self.theta.len()
+    }
+
+    /// Degrees of freedom of the noise levels, taken with care: position and orientation share the numbers.
+    fn freedom_of_noise(&self) -> f64 {
+        (0.5 * (6.0 * self.views as f64 - self.determined)).max(1.0)
+    }
+
+    /// Degrees of freedom of the variance of some unknowns. What of it is due to the slopes of the field is in proportion to
+    /// their variance, which is estimated from the slopes alone that the data determine: nine in each part at the most,
+    /// however many views there are. The rest is the noise's.
+    pub fn freedom(&self, at: usize, count: usize) -> f64 {
+        let covariance = self.covariance.view((at, at), (count, count)).into_owned();
+        let by_slopes = |part: &Range<usize>| self.covariance.view((at, part.start), (count, part.len())).into_owned();
+        self.pooled(&covariance, by_slopes)
+    }
+
+    /// The same of how far a view that is not in the fit is from what is expected of it.
+    pub fn freedom_of_view(&self, view: usize) -> Option<f64> {
+        let design = &self.designs[view];
+        let own = self.weights[view].try_inverse()?;
+        let shared = design * &self.covariance * design.transpose();
+        let by_slopes = |part: &Range<usize>| design * self.covariance.columns(part.start, part.len());
+        Some(self.pooled(&DMatrix::from_fn(6, 6, |i, j| own[(i, j)] + shared[(i, j)]), by_slopes))
+    }
+
+    /// By a covariance, and the covariance of its numbers with some of the slopes: by the log of the variance `v` of these
+    /// the covariance `C` changes by `C_s C_sᵀ / v`.
+    fn pooled(&self, covariance: &DMatrix<f64>, by_slopes: impl Fn(&Range<usize>) -> DMatrix<f64>) -> f64 {
+        let Some(inverse) = inverse(covariance) else { return self.freedom_of_noise() };
+        let of_field = self.slopes.iter().zip(self.levels.field).map(|(part, level)| {
+            let with = by_slopes(part);
+            let share = (&inverse * &with).dot(&with) / (level * covariance.nrows() as f64);
+            let known = part.len() as f64 - part.clone().map(|i| self.covariance[(i, i)]).sum::<f64>() / level;
+            (share, known)
+        });
+        let of_field: Vec<(f64, f64)> = of_field.collect();
+        let of_noise = 1.0 - of_field.iter().map(|(share, _)| share).sum::<f64>();
+        pooled_freedom(of_field.into_iter().chain([(of_noise, self.freedom_of_noise())]))
+    }
+
+    /// Wald's statistic of `count` unknowns from `at`.
+    pub fn wald(&self, at: usize, count: usize) -> Option<f64> {
+        let theta = self.theta.rows(at, count).into_owned();
+        let information = inverse(&self.covariance.view((at, at), (count, count)).into_owned())?;
+        Some(theta.dot(&(information * &theta)))
+    }
+
+    /// Covariance of the residuals of views that are not in the fit.
+    pub fn wald_of_views(&self, views: &[usize]) -> Option<f64> {
+        let n = 6 * views.len();
+        let mut covariance = DMatrix::zeros(n, n);
+        let mut stacked = DVector::zeros(n);
+        for (a, &i) in views.iter().enumerate() {
+            stacked.rows_mut(6 * a, 6).copy_from(&self.residuals[i]);
+            let own = self.weights[i].try_inverse()?;
+            for (b, &j) in views.iter().enumerate() {
+                let shared = &self.designs[i] * &self.covariance * self.designs[j].transpose();
+                let mut block = covariance.view_mut((6 * a, 6 * b), (6, 6));
+                block.copy_from(&shared);
+                if a == b {
+                    block += own;
+                }
+            }
+        }
+        Some(stacked.dot(&(inverse(&covariance)? * &stacked)))
+    }
+
+    /// Noise of the robot per axis, metres and radians.
+    pub fn robot_sigma(&self) -> (f64, f64) {
+        (self.levels.noise[0].sqrt(), self.levels.noise[1].sqrt())
+    }
+}

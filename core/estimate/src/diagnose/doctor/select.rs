@@ -1,0 +1,187 @@
+//! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
+//! judged anew beside it.
+
+use super::agreement::Agreement;
+use super::effect::Effect;
+use super::judge::{Judged, LEAST_SCALE, confirm, judge};
+use super::model::{Fit, Levels, Model, State};
+use super::screen::{Candidate, screened};
+use super::views::SessionViews;
+use super::weight::Weight;
+use crate::TargetSize;
+use crate::handeye::joint::field::Places;
+use handeye_geometry::progress::Work;
+
+/// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
+pub(super) const NEED: usize = 5;
+/// Outlier views at the most, as a part of all: beyond it the others are no majority to judge by.
+const MOST_ASIDE: f64 = 0.34;
+/// A view whose misfit is so many times the median belongs to the set of views that may be left out as an outlier together. It
+/// proposes them; whether they are outliers is a matter of the test of all hypotheses.
+const FAR: f64 = 5.0;
+/// Rounds of moving the solution to where the majority wants it; the second already changes it by a rounding.
+const ROUNDS: usize = 3;
+/// Hypotheses taken in at the most, which bounds the work: one for every view that is an outlier by itself, and some more.
+const MOST_TAKEN: usize = 12;
+/// Work after which no more is taken in, as [`Model::work`] counts it; a round of hypotheses beside each other may go a little
+/// beyond it, and that more is wrong is said. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
+const MOST_WORK: u64 = 100_000_000;
+/// Views that are tested together at the most.
+const MOST_TOGETHER: usize = 40;
+
+/// Everything judged.
+pub(super) struct Selection<'a> {
+    /// What was taken in, in that order.
+    pub taken: Vec<Judged>,
+    /// The best of every other kind, the best first.
+    pub others: Vec<Judged>,
+    pub model: Model<'a>,
+    /// The last fit.
+    pub fit: Fit,
+    /// More would have been taken in, and the work was ended.
+    pub is_ended: bool,
+}
+
+/// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
+pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
+    let places = Places::for_field(sight.views.iter().map(|view| &view.base_from_tip));
+    let mut model = Model::new(sight, start.solution, places);
+    let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
+    let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
+    let noise_m = start.median_m / 3.0;
+    let mut levels = Levels::even([noise_m, noise_m / sight.distance_m.max(0.01)].map(|sigma| sigma.powi(2)));
+    // The majority says where the equations are made linear; with many far views there is none, and all are taken.
+    let majority = State { effects: Vec::new(), aside: if far.len() <= most_aside { far.clone() } else { Vec::new() } };
+    for _ in 0..ROUNDS {
+        let fit = model.fit(&majority, levels)?;
+        levels = fit.levels;
+        model = model.moved(&fit);
+        if !model.has_field(&fit) {
+            model.field = None;
+        }
+    }
+    let mut state = State::default();
+    let mut fit = model.fit(&state, levels)?;
+    let (mut taken, mut others): (Vec<Judged>, Vec<Judged>) = (Vec::new(), Vec::new());
+    let mut is_ended;
+    loop {
+        if work.is_cancelled() {
+            return None;
+        }
+        let room = most_aside.saturating_sub(state.aside.len());
+        let together: Vec<usize> = far.iter().copied().filter(|i| !state.aside.contains(i)).collect();
+        let mut candidates = screened(&model, &state, &fit, room);
+        if (2..=room.min(MOST_TOGETHER)).contains(&together.len()) {
+            candidates.push(Candidate::Views(together));
+        }
+        let mut judged: Vec<Judged> = candidates.into_iter().filter_map(|c| judge(&model, &state, &fit, c)).collect();
+        judged.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut best = None;
+        for (i, judged) in judged.iter_mut().enumerate() {
+            // Beside others only the best is asked for; alone, all of them are listed.
+            if taken.is_empty() || best.is_none() {
+                confirm(&model, &fit, judged);
+                best = best.or_else(|| judged.holds().then_some(i));
+            }
+        }
+        let best = best.filter(|_| taken.len() < MOST_TAKEN);
+        is_ended = best.is_some() && !taken.is_empty() && model.work() > MOST_WORK;
+        let mut taken_now = None;
+        for (i, j) in judged.into_iter().enumerate() {
+            if Some(i) == best && !is_ended {
+                taken_now = Some(j);
+            } else if taken.is_empty() {
+                others.push(j);
+            }
+        }
+        let Some(next) = taken_now else { break };
+        state = next.state.clone();
+        fit = model.fit(&state, next.fit.levels)?;
+        taken.push(next);
+    }
+    drop_overtaken(&model, &mut state, &mut fit, &mut taken)?;
+    others.retain(|o| !taken.iter().any(|t| same_kind(&t.candidate, &o.candidate)));
+    if let Some(first) = taken.first().filter(|first| first.matters) {
+        for other in &mut others {
+            other.as_good = other.explains_as_much_as(first);
+        }
+    }
+    Some(Selection { taken, others, model, fit, is_ended })
+}
+
+impl Selection<'_> {
+    /// Takes the size of the target from the joint estimate, which has bend, field and lens beside it and every corner: poses
+    /// measured by a flat board, and a size that is linear in them, are wrong about it where the board is bent. What that does
+    /// not show stays in the model and is not reported.
+    pub fn with_size(mut self, size: &TargetSize) -> Self {
+        let is_scale = |j: &&mut Judged| j.candidate == Candidate::Effect(Effect::Scale);
+        for judged in self.taken.iter_mut().chain(&mut self.others).filter(is_scale) {
+            (judged.numbers, judged.sigma) = (vec![size.scale - 1.0], vec![size.sigma]);
+            judged.significant &= size.is_another();
+            judged.matters = judged.significant && (size.scale - 1.0).abs() >= LEAST_SCALE;
+            judged.as_good &= judged.matters;
+        }
+        self
+    }
+}
+
+fn same_kind(a: &Candidate, b: &Candidate) -> bool {
+    match (a, b) {
+        (Candidate::Effect(a), Candidate::Effect(b)) if a.is_of_lens() => b.is_of_lens(),
+        (Candidate::Effect(a), Candidate::Effect(b)) => std::mem::discriminant(a) == std::mem::discriminant(b),
+        (Candidate::Views(_), Candidate::Views(_)) => true,
+        _ => false,
+    }
+}
+
+/// An effect that was taken in first may be explained by those that came later.
+fn drop_overtaken(model: &Model<'_>, state: &mut State, fit: &mut Fit, taken: &mut Vec<Judged>) -> Option<()> {
+    loop {
+        let lens = model.sight.lens_count();
+        let mut at = model.effects_at();
+        let mut weak = None;
+        for effect in &state.effects {
+            if !Weight::of_effect(model, fit, *effect, at)?.significant {
+                weak = Some(*effect);
+            }
+            at += effect.numbers(lens);
+        }
+        let Some(weak) = weak else { return Some(()) };
+        state.effects.retain(|e| *e != weak);
+        taken.retain(|j| j.candidate != Candidate::Effect(weak));
+        *fit = model.fit(state, fit.levels)?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::*;
+    use crate::diagnose::doctor::{diagnose, gross};
+    use crate::diagnose::findings::FindingOptions;
+    use crate::handeye::Mode;
+    use crate::testing::faulty::{Setup, session};
+    use handeye_geometry::progress::CancelToken;
+
+    /// A real session in which every fourth view is wrong, each in a way of its own and less than grossly.
+    #[test]
+    fn a_session_with_much_wrong_is_examined_within_bounds_and_the_end_is_said() {
+        for (views, joints) in [(40, false), (100, false), (100, true)] {
+            let mut observations = session(&Setup { joints, ..Setup::new(Mode::EyeInHand, views, 5) });
+            for (i, view) in observations.views.iter_mut().enumerate().filter(|(i, _)| i % 4 == 1) {
+                let off =
+                    Vector6::from_fn(|k, _| (((i * 7 + k * 5) % 11) as f64 - 5.0) * if k < 3 { 1.5e-3 } else { 3e-3 });
+                view.base_from_tip = view.base_from_tip.map(|pose| pose.perturbed(&off));
+            }
+            let cancel = CancelToken::default();
+            let sight = SessionViews::new(&observations, None).expect("views");
+            let start = gross::gross(&sight, &(&cancel).into()).expect("not cancelled").as_given.expect("a solution");
+            let selection = select(&sight, &start, &(&cancel).into()).expect("selected");
+            assert!(selection.model.work() < 2 * MOST_WORK, "{views}: {}", selection.model.work());
+            let diagnosis = diagnose(&observations, &FindingOptions::default(), &cancel);
+            assert!(!diagnosis.is_healthy());
+            assert_eq!(selection.is_ended, diagnosis.untested.is_some_and(|why| why.contains("was ended after")));
+        }
+    }
+}

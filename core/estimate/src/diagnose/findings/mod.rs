@@ -1,0 +1,78 @@
+//! What is wrong or weak in a set of views and its calibration, and what to do next.
+//!
+//! A finding is data first: a code, a severity, numbers with units and the views concerned; as text, in any language, it
+//! says what it is, by which evidence, and what to do. Residuals say how well the model fits, and are never given as
+//! accuracy; where a finding speaks of the expected error it is the one stated by the covariance.
+//!
+//! Before a calibration only the views themselves are judged; with one, also the answer.
+
+mod answer;
+mod depth;
+mod direction;
+mod finding;
+pub(crate) mod outliers;
+mod shared_lens;
+mod views;
+
+pub use depth::finding as depth_finding;
+pub(crate) use finding::listed;
+pub use finding::{Finding, FindingCode, Severity};
+pub use outliers::WIDENING_WORTH_SAYING;
+use serde::Serialize;
+
+use crate::Observations;
+use crate::diagnose::Calibration;
+
+/// One number that supports a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Evidence {
+    /// What it is.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its unit; empty for a count or a ratio.
+    pub unit: &'static str,
+}
+
+/// What the user wants.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub struct FindingOptions {
+    /// The expected error to reach (95 %, see [`Calibration::tip_error_95_m`]), millimetres; `None` for no goal.
+    pub goal_mm: Option<f64>,
+}
+
+impl FindingOptions {
+    /// With an error to reach (95 %), millimetres; `None` for no goal.
+    pub const fn with_goal_mm(goal_mm: Option<f64>) -> Self {
+        Self { goal_mm }
+    }
+}
+
+/// Everything found, the most severe first, in the order of [`FindingCode`] within a severity. Views out of the fit
+/// count for nothing.
+///
+/// `calibration` is that of these observations; findings on the answer need it.
+pub fn findings(
+    observations: &Observations,
+    calibration: Option<&Calibration>,
+    options: &FindingOptions,
+) -> Vec<Finding> {
+    let mut found = views::findings(observations, calibration);
+    if let Some(calibration) = calibration {
+        found.extend(answer::findings(calibration, options));
+        found.extend(direction::finding(calibration));
+        found.extend(shared_lens::finding(calibration));
+        found.extend(crate::diagnose::findings::outliers::findings(calibration));
+    }
+    sort(&mut found);
+    found
+}
+
+/// The most severe first, in the order of the codes within a severity.
+pub fn sort(found: &mut [Finding]) {
+    found.sort_by(|a, b| b.severity.cmp(&a.severity).then(a.code.cmp(&b.code)));
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,58 @@
+use nalgebra::{DMatrix, Matrix2};
+
+use super::*;
+use crate::handeye::Mode;
+use crate::handeye::joint::{CornerWeights, estimate};
+use crate::testing::sessions::{REALISTIC, camera, trial};
+use handeye_geometry::targets::corner_covariance::CornerCovariance;
+use handeye_geometry::targets::observation::{Corners, View};
+
+/// Corners of which one in three is twice as good along a direction, the same in every view.
+fn covariance_px2(corner: usize) -> Matrix2<f64> {
+    if corner.is_multiple_of(3) { Matrix2::new(0.01, 0.004, 0.004, 0.02) } else { Matrix2::identity() * 0.04 }
+}
+
+/// Where corners share nothing their covariance together says what those of single corners say: the answer, and what the equations
+/// of every effect are.
+#[test]
+fn corners_that_share_nothing_count_together_as_each_for_itself() {
+    let cancel = CancelToken::default();
+    let session = trial(Mode::EyeInHand, 12, &REALISTIC, camera(), 7);
+    let stated = |together: bool| -> Vec<View> {
+        let of = |view: &View| {
+            let corner = |corner: &Corner| Corner { covariance_px2: Some(covariance_px2(corner.index)), ..*corner };
+            let corners: Vec<Corner> = view.corners.iter().map(corner).collect();
+            let mut all = DMatrix::zeros(2 * corners.len(), 2 * corners.len());
+            for (i, corner) in corners.iter().enumerate() {
+                all.fixed_view_mut::<2, 2>(2 * i, 2 * i).copy_from(&covariance_px2(corner.index));
+            }
+            let corners =
+                if together { Corners::together(corners, CornerCovariance::new(&all)) } else { corners.into() };
+            View { corners, ..view.clone() }
+        };
+        session.views.iter().map(of).collect()
+    };
+    let solved = |views: &[View]| {
+        let weights = CornerWeights::stated(views.iter().flat_map(|view| view.corners.iter()));
+        let problem = JointProblem { views, weights, ..session.problem(true, None) };
+        let solution = estimate(&problem, &session.start(), &cancel).expect("solves");
+        let equations = [Effect::Distortion(3), Effect::Print].map(|effect| {
+            Equations::new(&problem, &solution, effect, &cancel).expect("not cancelled").expect("enough residuals")
+        });
+        (solution, equations)
+    };
+    let (each, of_each) = solved(&stated(false));
+    let (together, of_together) = solved(&stated(true));
+    let apart = each.hand_eye.mount_from_camera().inverse() * together.hand_eye.mount_from_camera();
+    assert!(apart.translation().norm() < 1e-9, "{apart:?}");
+    assert!((each.noise.corner_px / together.noise.corner_px - 1.0).abs() < 1e-6);
+    for (a, b) in of_each.iter().zip(&of_together) {
+        assert!((&a.information - &b.information).amax() < 1e-5 * a.information.amax());
+        assert!(
+            (&a.pull - &b.pull).amax() < 1e-5 * a.pull.amax(),
+            "{} of {}",
+            (&a.pull - &b.pull).amax(),
+            a.pull.amax()
+        );
+    }
+}

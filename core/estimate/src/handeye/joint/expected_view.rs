@@ -1,0 +1,231 @@
+//! What a view that was not taken is expected to say, by the model of a finished calibration.
+//!
+//! With the corners of a view linearised at the estimate, its pixel residuals are split into the six numbers that a pose of
+//! its own could explain and the rest ([`super::view_block`]). The six are
+//! `z = A s + A_d d + e` in units of their own noise, with the unknowns `s` that all views share, the error `d` of the
+//! robot and white noise `e`. With `d ~ N(0, Σ)` they say `Aᵀ (1 + A_d Σ A_dᵀ)⁻¹ A` about `s`; the rest says
+//! `F / corner_px²` about lens and shape. Both are kept as rows `R` with `Rᵀ R` the information, so that a view is a change
+//! of low rank.
+
+use nalgebra::{Cholesky, DMatrix, Matrix6, Vector2, Vector6};
+
+use super::chain::Chain;
+use super::expected_pixels::ExpectedPixels;
+use super::field::{HALF, RobotField, SLOPES};
+use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
+use super::{Free, Noise};
+use crate::Fit;
+use crate::handeye::{HandEye, Mode};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+use handeye_geometry::targets::observation::{Corner, View};
+use handeye_geometry::view_equations::{PoseEquations, ViewInput, Whitener};
+
+/// Part of its largest diagonal entry below which a pivot is rounding.
+const NO_PIVOT: f64 = 1e-12;
+
+/// The model that a calibration ended with: what its views share, and how noisy they are.
+///
+/// Offsets of joints are left out: where they were estimated the links are taken as they are with them.
+#[derive(Debug, Clone)]
+pub struct ViewModel {
+    hand_eye: HandEye,
+    intrinsics: Intrinsics,
+    free: Free,
+    noise: Noise,
+    board: BoardPoints,
+    shape: BoardShape,
+    field: Option<RobotField>,
+    layout: Layout,
+}
+
+/// What a view says of the unknowns that all views share.
+#[derive(Debug, Clone)]
+pub struct ExpectedView {
+    /// `R`, with the information `Rᵀ R`; a column per unknown.
+    rows: DMatrix<f64>,
+}
+
+impl ViewModel {
+    /// That of a joint estimate with a robot and a camera; `None` for any other calibration.
+    pub fn new(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
+        let joint = calibration.joint.as_ref()?;
+        let intrinsics = calibration.intrinsics()?;
+        let free = Free { joints: false, depth: false, ..joint.free };
+        let field = joint.field.clone();
+        let layout =
+            Layout { form: free.form().count(&intrinsics), joints: 0, field: field.as_ref().map_or(0, |_| SLOPES) };
+        Some(Self {
+            hand_eye: calibration.hand_eye?,
+            intrinsics,
+            free,
+            noise: joint.noise,
+            board: BoardPoints::new(&target.points()),
+            shape: joint.shape.map_or_else(BoardShape::default, |estimate| estimate.shape),
+            field,
+            layout,
+        })
+    }
+
+    /// Of links and lens that are known, with a flat target and a robot whose errors do not depend on where it stands.
+    pub fn known(
+        hand_eye: HandEye,
+        intrinsics: Intrinsics,
+        free_lens: bool,
+        noise: Noise,
+        target: &TargetSpec,
+    ) -> Self {
+        let free = Free { intrinsics: free_lens, ..Free::default() };
+        let layout = Layout { form: free.form().count(&intrinsics), joints: 0, field: 0 };
+        let board = BoardPoints::new(&target.points());
+        Self { hand_eye, intrinsics, free, noise, board, shape: BoardShape::default(), field: None, layout }
+    }
+
+    /// The same with other noise levels.
+    #[must_use]
+    pub fn with_noise(self, noise: Noise) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// Noise levels.
+    pub fn noise(&self) -> &Noise {
+        &self.noise
+    }
+
+    /// Where the camera sits.
+    pub fn mode(&self) -> Mode {
+        self.hand_eye.mode()
+    }
+
+    /// Both links.
+    pub fn hand_eye(&self) -> &HandEye {
+        &self.hand_eye
+    }
+
+    /// The lens.
+    pub fn intrinsics(&self) -> &Intrinsics {
+        &self.intrinsics
+    }
+
+    /// Number of the unknowns that all views share.
+    pub fn unknowns(&self) -> usize {
+        self.layout.count()
+    }
+
+    /// What is known of the unknowns without any view: of the slopes of the robot's field their level; of the rest so
+    /// little that any few views know more, and enough that every question has an answer.
+    pub fn prior(&self) -> DMatrix<f64> {
+        let mut sigma = vec![1.0; self.unknowns()];
+        if self.free.intrinsics {
+            let focal_px = self.intrinsics.fx;
+            for (k, value) in sigma[Layout::FORM_AT..].iter_mut().take(self.intrinsics.parameter_count()).enumerate() {
+                *value = if k < 4 { focal_px } else { 10.0 };
+            }
+        }
+        for k in 0..self.layout.field {
+            sigma[self.layout.field_at() + k] = if k < HALF { self.noise.field_m } else { self.noise.field_rad };
+        }
+        DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
+            sigma.len(),
+            sigma.iter().map(|sigma| sigma.max(f64::MIN_POSITIVE.sqrt()).powi(-2)),
+        ))
+    }
+
+    /// The pose of the target in a view, and the equations of the view at it; `None` where `corners`, by their index, do
+    /// not determine a pose, or are not in front of the camera.
+    fn block(&self, base_from_tip: &Pose<Base, Tip>, corners: &[usize]) -> Option<ViewBlock> {
+        let chain = self.chain(base_from_tip);
+        // Where the corners were found does not matter to what they say.
+        let corners: Vec<Corner> = corners.iter().map(|&index| Corner::new(index, Vector2::zeros())).collect();
+        let seen = ViewInput {
+            intrinsics: &self.intrinsics,
+            board: &self.board,
+            shape: &self.shape,
+            corners: &corners,
+            whitener: &Whitener::Alike,
+            depths: None,
+        };
+        let equations = PoseEquations::new(&seen, &chain.camera_from_target, self.free.form()).ok()?;
+        let place = self.field.as_ref().map(|field| field.place(base_from_tip));
+        ViewBlock::new(&chain, &equations, self.layout, place.as_ref())
+    }
+
+    fn chain(&self, base_from_tip: &Pose<Base, Tip>) -> Chain {
+        let by_field = self.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(base_from_tip));
+        let view = View::new(String::new(), *base_from_tip, Vec::new());
+        let (mount, anchor) = (self.hand_eye.mount_from_camera(), self.hand_eye.anchor_from_target());
+        Chain::with_joints(self.mode(), &view, &[], &by_field, &mount, &anchor)
+    }
+
+    /// Where the target is in a view from a reported tip pose.
+    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
+        Pose::from_isometry(self.chain(base_from_tip).camera_from_target)
+    }
+
+    /// From where the robot would see the target so, without its field.
+    pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
+        self.hand_eye.base_from_tip(camera_from_target)
+    }
+
+    /// What a view from a reported tip pose says, in which the corners with these indices are found; `None` where they do
+    /// not determine a pose or are not in front of the camera.
+    pub fn expected(&self, base_from_tip: &Pose<Base, Tip>, corners: &[usize]) -> Option<ExpectedView> {
+        let block = self.block(base_from_tip, corners)?;
+        let weights = PixelWeights::new(&self.noise);
+        let n = self.unknowns();
+        let by_robot = block.by_correction * weights.pose.sqrt();
+        let spread = Matrix6::from_diagonal(&prior_weight(&self.noise).map(f64::recip));
+        let noise = Cholesky::new(Matrix6::identity() + by_robot * spread * by_robot.transpose())?.l();
+        let of_pose = whitened(&noise, block.by_shared.transpose() * weights.pose.sqrt());
+        let rest = block.rest.form * weights.rest;
+        let rest = half_root(rest);
+        let mut rows = DMatrix::zeros(6 + rest.nrows(), n);
+        rows.rows_mut(0, 6).copy_from(&of_pose);
+        rows.view_mut((6, Layout::FORM_AT), rest.shape()).copy_from(&rest);
+        Some(ExpectedView { rows })
+    }
+
+    /// Where the points of the target are expected in a view from a reported tip pose, with shared unknowns of that covariance.
+    pub fn pixels<'a>(&'a self, base_from_tip: &Pose<Base, Tip>, covariance: &'a DMatrix<f64>) -> ExpectedPixels<'a> {
+        let lens = if self.free.intrinsics { self.intrinsics.parameter_count() } else { 0 };
+        let field = self.field.as_ref().map(|field| (field, base_from_tip));
+        let chain = self.chain(base_from_tip);
+        ExpectedPixels::new(&self.intrinsics, &chain, (self.layout, lens), field, &self.noise, covariance)
+    }
+}
+
+impl ExpectedView {
+    /// `R`, with the information `Rᵀ R`.
+    pub fn rows(&self) -> &DMatrix<f64> {
+        &self.rows
+    }
+
+    /// What it says of the unknowns, their inverse covariance.
+    pub fn information(&self) -> DMatrix<f64> {
+        self.rows.tr_mul(&self.rows)
+    }
+}
+
+/// `R` with `Rᵀ R` a matrix that is positive but for rounding, without the rows that say nothing.
+fn half_root(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(0.0)).collect();
+    let mut rows: Vec<nalgebra::RowDVector<f64>> = Vec::with_capacity(n);
+    for i in 0..n {
+        let pivot = matrix[(i, i)];
+        // A direction that those before it know already, or that nothing is known of.
+        if pivot <= NO_PIVOT * scale[i] || pivot <= 0.0 {
+            continue;
+        }
+        let row = matrix.row(i) / pivot.sqrt();
+        matrix -= row.tr_mul(&row);
+        rows.push(row);
+    }
+    if rows.is_empty() { DMatrix::zeros(0, n) } else { DMatrix::from_rows(&rows) }
+}
+
+#[cfg(test)]
+#[path = "expected_view_tests.rs"]
+mod tests;

@@ -1,0 +1,186 @@
+//! What the joint estimate is given.
+
+use nalgebra::DMatrix;
+
+use crate::handeye::Mode;
+use crate::handeye::joint::chain::MAX_JOINTS;
+use crate::handeye::joint::field::{Places, RobotField};
+use crate::handeye::joint::state::State;
+use crate::handeye::joint::weights::CornerWeights;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+use handeye_geometry::targets::observation::View;
+use handeye_geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput, Whitener};
+
+/// Noise levels, one standard deviation per axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a corner, pixels.
+    pub corner_px: f64,
+    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
+    /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
+    /// none.
+    pub view_px: f64,
+    /// Of the reported tip position, metres.
+    pub robot_m: f64,
+    /// Of the reported tip orientation, radians.
+    pub robot_rad: f64,
+    /// Of errors of the reported tip position that depend on where it is, see [`RobotField`], metres: at a distance of the
+    /// RMS spread of the places from their mean. Zero where they are not in the model.
+    pub field_m: f64,
+    /// Of the reported tip orientation likewise, radians.
+    pub field_rad: f64,
+}
+
+impl Noise {
+    /// None at all.
+    pub const EXACT: Self =
+        Self { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0, field_m: 0.0, field_rad: 0.0 };
+}
+
+/// What is estimated besides the two rigid links.
+#[expect(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Free {
+    /// Focal lengths, principal point and distortion.
+    pub intrinsics: bool,
+    /// The two warps of the target, see [`BoardShape`].
+    pub warp: bool,
+    /// The true size of the target over the stated one. It is seen through the robot's translations alone.
+    pub scale: bool,
+    /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
+    /// [`JOINT_PRIOR_RAD`](super::JOINT_PRIOR_RAD). Those of the first and the last joint stay zero: the two links take them up.
+    pub joints: bool,
+    /// Errors of the robot that depend on where it stands, see [`RobotField`].
+    pub field: bool,
+    /// Errors of the depths of the views, see [`DepthBias`](handeye_geometry::view_equations::DepthBias).
+    pub depth: bool,
+}
+
+impl Free {
+    pub(crate) fn form(self) -> FreeParameters {
+        FreeParameters { lens: self.intrinsics, warp: self.warp, scale: self.scale, depth: self.depth }
+    }
+}
+
+/// What is known of free intrinsics beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct LensPrior<'a> {
+    /// The expected intrinsics.
+    pub expected: Intrinsics,
+    /// Inverse of their covariance, in the order of [`Intrinsics::parameters`] and of their size; a direction of which
+    /// nothing is known has none.
+    pub information: &'a DMatrix<f64>,
+}
+
+/// How depths count against corners, and what is known of their tilt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthWeight {
+    /// Pixels of a corner's error that a metre of the depths' counts as.
+    pub px_per_m: f64,
+    /// Whether it is open how far they are turned against the lens; otherwise they are measured along it.
+    pub turned: bool,
+}
+
+impl DepthWeight {
+    /// Standard deviation of the tilt of the depths before any data, about either axis, radians.
+    pub(super) fn tilt_sigma_rad(self) -> f64 {
+        if self.turned { TURNED_RAD } else { STRAIGHT_RAD }
+    }
+}
+
+/// Standard deviation of the tilt of depths that are not measured along the lens, about either axis, radians. That it is 0.3° is an
+/// assumption about mountings of two sensors; its order is what matters. Where the tilt is known to a twentieth of it, depths count
+/// as turned from 3.5 of the tilt's standard deviations on, and with three times as much from 4.0.
+const TURNED_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
+/// And of those that are: none.
+const STRAIGHT_RAD: f64 = 1e-7;
+
+/// The data and what is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct JointProblem<'a> {
+    /// Where the camera sits.
+    pub mode: Mode,
+    /// Points of the target as drawn.
+    pub board: &'a BoardPoints,
+    /// Views with corners; a view without corners is an error of the caller.
+    pub views: &'a [View],
+    /// What is estimated besides the links.
+    pub free: Free,
+    /// What is known of free intrinsics.
+    pub lens_prior: Option<LensPrior<'a>>,
+    /// How corners are weighed against each other; `None` for all alike.
+    pub weights: Option<CornerWeights>,
+    /// How the depths of the views count; `None` where they do not.
+    pub depth: Option<DepthWeight>,
+    /// Noise levels when they are known; otherwise they are estimated.
+    pub noise: Option<Noise>,
+    /// Whether the corners of a view share noise ([`Noise::view_px`]), where that is decided; otherwise these views decide.
+    pub view_noise: Option<bool>,
+}
+
+impl<'a> JointProblem<'a> {
+    /// Both links from these views, with known intrinsics and a flat target, all corners alike, noise levels estimated.
+    pub fn new(mode: Mode, board: &'a BoardPoints, views: &'a [View]) -> Self {
+        Self {
+            mode,
+            board,
+            views,
+            free: Free::default(),
+            lens_prior: None,
+            weights: None,
+            depth: None,
+            noise: None,
+            view_noise: None,
+        }
+    }
+
+    /// A view through the lens of a state, with the whitener of its corners.
+    pub(super) fn seen<'v>(&'v self, state: &'v State, view: &'v View, whitener: &'v Whitener) -> ViewInput<'v> {
+        ViewInput {
+            intrinsics: &state.intrinsics,
+            board: self.board,
+            shape: &state.shape,
+            corners: &view.corners,
+            whitener,
+            depths: self.depth.zip(view.depth.as_ref()).map(|(weight, plane)| MeasuredDepths {
+                plane,
+                bias: &state.depth,
+                px_per_m: weight.px_per_m,
+            }),
+        }
+    }
+
+    /// How the corners of a view count.
+    pub(super) fn whitener(&self, view: &View) -> Whitener {
+        self.weights.map_or(Whitener::Alike, |weights| weights.whitener(&view.corners))
+    }
+
+    /// Number of joint offsets that are estimated: none unless all views know their joints.
+    pub(super) fn joint_count(&self) -> usize {
+        let fewest = self.views.iter().map(|view| view.tip_by_joint.len()).min().unwrap_or(0);
+        if self.free.joints { fewest.min(MAX_JOINTS) } else { 0 }
+    }
+
+    /// The field without errors, where it is free and the tip does not stay where it is.
+    pub(super) fn field(&self) -> Option<RobotField> {
+        let poses = self.views.iter().map(|view| &view.base_from_tip);
+        self.free.field.then(|| Places::of(poses).map(RobotField::none)).flatten()
+    }
+}
+
+/// Where the iteration starts.
+#[derive(Debug, Clone, Copy)]
+pub struct JointStart {
+    /// Hand-eye transform, from a closed form.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// Place of the target.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// Intrinsics; kept when they are not free.
+    pub intrinsics: Intrinsics,
+    /// Shape of the target; kept when it is not free.
+    pub shape: BoardShape,
+    /// Noise levels to start from, where they are to be estimated; `None` finds a start from the misfit.
+    pub noise: Option<Noise>,
+}

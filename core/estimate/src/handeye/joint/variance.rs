@@ -1,0 +1,384 @@
+//! Noise levels from the data: restricted maximum likelihood of the linearised model.
+//!
+//! With all unknowns integrated out, minus twice the log-likelihood of the noise levels is
+//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` (and nine times each of
+//! `ln field_m²` and `ln field_rad²`, where the robot's field is in the model) for `n` residuals of `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
+//! the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there in a
+//! few steps where EM crawls when the robot is nearly exact.
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+
+use super::field::HALF;
+use super::information::information;
+use super::normal::{Reduced, System};
+use super::view_block::{add_square, columns, prior_weight};
+use super::{JointProblem, Noise};
+use crate::handeye::joint::state::State;
+use crate::handeye::{HandEyeError, determined};
+
+/// Lowest levels: a nanometre, a nanoradian and a millionth of a pixel are exact for every purpose here.
+const LOWEST: Noise =
+    Noise { corner_px: 1e-6, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9, field_m: 1e-9, field_rad: 1e-9 };
+/// Highest levels: beyond them the robot pose says nothing.
+const HIGHEST: Noise =
+    Noise { corner_px: 1e4, view_px: 1e4, robot_m: 1.0, robot_rad: 1.0, field_m: 1.0, field_rad: 1.0 };
+/// A field of less than this part of the robot's noise is none, and how much less does not matter.
+const NO_FIELD: f64 = 1e-3;
+/// Newton steps.
+const MAX_STEPS: usize = 60;
+/// Largest change of a log-variance in one step.
+const LARGEST_STEP: f64 = 3.0;
+/// Gain of the likelihood below which the levels of an answer stand still: a unit of `-2 ln L` is one standard deviation, so
+/// they are off by a thousandth of one.
+pub const EXACTLY: f64 = 1e-6;
+/// And those that something is decided by, which asks for gains of some units: they are off by a tenth of a standard
+/// deviation.
+pub const ROUGHLY: f64 = 1e-2;
+
+/// Which levels are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Levels {
+    /// What the corners of a view have in common.
+    pub view: bool,
+    /// The robot's field.
+    pub field: bool,
+}
+
+impl Levels {
+    /// Places among the [`Logs`].
+    pub fn estimated(self) -> impl Iterator<Item = usize> {
+        (0..LEVELS).filter(move |k| match k {
+            0..3 => true,
+            3 => self.view,
+            _ => self.field,
+        })
+    }
+
+    /// Numbers per level, with those of the poses' part added to those of the corners where the two are one level.
+    pub fn folded(self, mut of_levels: Logs) -> Logs {
+        if !self.view {
+            of_levels[0] += of_levels[3];
+            of_levels[3] = 0.0;
+        }
+        of_levels
+    }
+
+    /// The same of a matrix with rows and columns per level; those of a level that is not estimated are zero.
+    pub fn folded_matrix(self, of_levels: &Matrix6<f64>) -> Matrix6<f64> {
+        let mut fold = Matrix6::identity();
+        if !self.view {
+            fold[(3, 3)] = 0.0;
+            fold[(0, 3)] = 1.0;
+        }
+        if !self.field {
+            fold[(4, 4)] = 0.0;
+            fold[(5, 5)] = 0.0;
+        }
+        fold * of_levels * fold.transpose()
+    }
+}
+
+/// Number of levels.
+pub const LEVELS: usize = 6;
+
+/// Logs of the variances of a corner, of the robot's position and orientation, of the part of a view that looks like a
+/// pose, and of the field's position and orientation. The fourth follows the first where it is not estimated, and the last
+/// two mean nothing then.
+pub type Logs = Vector6<f64>;
+
+/// Rough levels for the first round: the robot is taken to explain the start's misfit with generous room.
+pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
+    let mut squared = 0.0;
+    let mut count = 0.0;
+    for view in problem.views {
+        let chain = state.chain(problem, view, &Vector6::zeros());
+        for corner in &view.corners {
+            let point = chain.camera_from_target * problem.board.point(corner.index, &state.shape);
+            if let Ok(px) = state.intrinsics.project(&point) {
+                squared += (px - corner.px).norm_squared();
+                count += 2.0;
+            }
+        }
+    }
+    // Corners are good to a fraction of a pixel on any working camera; the rest of the misfit is the robot's to take.
+    let misfit_px = if count > 0.0 { f64::sqrt(squared / count) } else { 1.0 };
+    Noise { corner_px: misfit_px.clamp(1e-3, 0.3), robot_m: 1e-3, robot_rad: 2e-3, ..Noise::EXACT }
+}
+
+/// Largest relative change of any level, ignoring what happens at the floor.
+pub fn change(a: &Noise, b: &Noise) -> f64 {
+    let relative = |a: f64, b: f64, floor: f64| (b.max(10.0 * floor) / a.max(10.0 * floor)).ln().abs();
+    relative(a.corner_px, b.corner_px, LOWEST.corner_px)
+        .max(relative(a.corner_px + a.view_px, b.corner_px + b.view_px, LOWEST.corner_px))
+        .max(relative(a.robot_m, b.robot_m, LOWEST.robot_m))
+        .max(relative(a.robot_rad, b.robot_rad, LOWEST.robot_rad))
+        .max(relative(a.field_m, b.field_m, NO_FIELD * a.robot_m))
+        .max(relative(a.field_rad, b.field_rad, NO_FIELD * a.robot_rad))
+}
+
+/// Minus twice the restricted log-likelihood at some levels, and what goes with it.
+pub struct Likelihood {
+    pub value: f64,
+    /// By the log-variances.
+    gradient: Logs,
+    /// How many residuals tell each level: all that it makes, less those that the unknowns use up and those that are lost in
+    /// the noise of the other levels. Those of the corners' rest and of the poses' part are apart, also where the two are one
+    /// level.
+    pub counts: Logs,
+    /// Sums of `F_iᵀ F_i` over the views, see [`super::information`], for the corrections of position and of orientation.
+    pub moments: [DMatrix<f64>; 2],
+    pub reduced: Reduced,
+    /// Of the shared unknowns.
+    pub covariance: DMatrix<f64>,
+    /// Of the shared unknowns, from the point of linearisation to the optimum at these levels.
+    pub step: DVector<f64>,
+}
+
+fn to_noise(logs: &Logs, levels: Levels) -> Noise {
+    let level = |i: usize, low: f64, high: f64| (0.5 * logs[i]).exp().clamp(low, high);
+    let corner_px = level(0, LOWEST.corner_px, HIGHEST.corner_px);
+    Noise {
+        corner_px,
+        // Of a level that is not estimated rounding would leave a difference, which then counted as one.
+        view_px: if levels.view {
+            (logs[3].exp() - corner_px.powi(2)).clamp(0.0, HIGHEST.view_px.powi(2)).sqrt()
+        } else {
+            0.0
+        },
+        robot_m: level(1, LOWEST.robot_m, HIGHEST.robot_m),
+        robot_rad: level(2, LOWEST.robot_rad, HIGHEST.robot_rad),
+        field_m: if levels.field { level(4, LOWEST.field_m, HIGHEST.field_m) } else { 0.0 },
+        field_rad: if levels.field { level(5, LOWEST.field_rad, HIGHEST.field_rad) } else { 0.0 },
+    }
+}
+
+/// The levels as logs of variances; the poses' part is that of corners and view together.
+pub fn to_logs(noise: &Noise) -> Logs {
+    let together = noise.corner_px.powi(2) + noise.view_px.powi(2);
+    let log = |level: f64| 2.0 * level.ln();
+    Logs::new(
+        log(noise.corner_px),
+        log(noise.robot_m),
+        log(noise.robot_rad),
+        together.ln(),
+        log(noise.field_m.max(LOWEST.field_m)),
+        log(noise.field_rad.max(LOWEST.field_rad)),
+    )
+}
+
+/// Keeps the logs in their range, and the pose's part no smaller than what independent corners make of it.
+pub fn kept(mut logs: Logs, levels: Levels) -> Logs {
+    let (low, high) = (to_logs(&LOWEST), to_logs(&HIGHEST));
+    for i in [0, 1, 2, 4, 5] {
+        logs[i] = logs[i].clamp(low[i], high[i]);
+    }
+    logs[3] = if levels.view { logs[3].clamp(logs[0], high[3]) } else { logs[0] };
+    logs
+}
+
+/// The restricted likelihood of a linearised system at some levels.
+///
+/// # Errors
+/// [`HandEyeError::NoSolution`] where the levels leave the answer undetermined, [`HandEyeError::Cancelled`].
+pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likelihood, HandEyeError> {
+    let noise = to_noise(logs, levels);
+    let reduced = system.reduce(&noise)?;
+    let prior = prior_weight(&noise);
+    let views = system.blocks.len() as f64;
+    let in_poses = 6.0 * views;
+    let in_rest = system.residual_count() as f64 - in_poses;
+    let least_cost = system.cost(&noise) - reduced.decrease();
+
+    let covariance = reduced.inverse();
+    let n = covariance.nrows();
+    let step = reduced.shared_step();
+    let steps = reduced.own_steps(&step);
+
+    // Expected sums of squares of the corrections: estimate plus posterior variance.
+    let mut squares = Vector6::zeros();
+    let mut variances = Vector6::zeros();
+    let mut moments = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
+    for ((own, step), correction) in reduced.own.iter().zip(&steps).zip(&system.corrections) {
+        if system.cancel.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        let estimate = correction + step;
+        squares += estimate.component_mul(&estimate);
+        variances += own.factor.inverse().diagonal();
+        let follows = own.follows();
+        let [x, y, z, rx, ry, rz] = columns(&follows);
+        add_square(&mut moments[0], [x, y, z], 1.0);
+        add_square(&mut moments[1], [rx, ry, rz], 1.0);
+    }
+    moments.iter_mut().for_each(DMatrix::fill_lower_triangle_with_upper_triangle);
+    let (squares, traces) = (squares.component_mul(&prior), variances.component_mul(&prior));
+    let halves = [0, 1].map(|k| {
+        let (at, through) = (3 * k, moments[k].dot(&covariance) * prior[3 * k]);
+        (squares.fixed_rows::<3>(at).sum(), traces.fixed_rows::<3>(at).sum() + through)
+    });
+    let unknowns = n as f64 + in_poses;
+    // tr(H H⁻¹) counts the unknowns; what the priors do not take of it is the corners' share.
+    let known_cost = system.prior_cost(&noise, Some(&step));
+    let known_trace = system.prior_trace(&noise, &covariance);
+    let corner_squares = least_cost - squares.sum() - known_cost;
+    let corner_trace = unknowns - halves[0].1 - halves[1].1 - known_trace;
+    let rest = system.rest_squares(&step, &covariance);
+    let (rest_squares, rest_trace) = (rest.0 / noise.corner_px.powi(2), rest.1 / noise.corner_px.powi(2));
+    let (mut field_squares, mut field_traces) = ([0.0; 2], [0.0; 2]);
+    let variance = [noise.field_m.powi(2), noise.field_rad.powi(2)];
+    for (k, slope) in system.slopes.iter().enumerate() {
+        let (index, half) = (system.layout.field_at() + k, k / HALF);
+        field_squares[half] += (slope + step[index]).powi(2) / variance[half];
+        field_traces[half] += covariance[(index, index)] / variance[half];
+    }
+    let slopes = if levels.field { HALF as f64 } else { 0.0 };
+    let value = in_rest * logs[0]
+        + slopes * (logs[4] + logs[5])
+        + in_poses * logs[3]
+        + 3.0 * views * (logs[1] + logs[2])
+        + reduced.log_determinant()
+        + least_cost;
+    let [m, rad] = halves;
+    let counts = Logs::new(
+        in_rest - rest_trace,
+        3.0 * views - m.1,
+        3.0 * views - rad.1,
+        in_poses - (corner_trace - rest_trace),
+        slopes - field_traces[0],
+        slopes - field_traces[1],
+    );
+    let squares =
+        Logs::new(rest_squares, m.0, rad.0, corner_squares - rest_squares, field_squares[0], field_squares[1]);
+    let gradient = levels.folded(counts - squares);
+    Ok(Likelihood { value, gradient, counts, moments, reduced, covariance, step })
+}
+
+/// The most likely noise levels of a linearised system, and what goes with them.
+pub struct MostLikely {
+    pub logs: Logs,
+    pub at: Likelihood,
+}
+
+impl MostLikely {
+    /// About half the second derivatives of what was minimised, by the log-variances; zero for a level that is not estimated.
+    pub fn information(&self, system: &System, levels: Levels, aim: Aim) -> Matrix6<f64> {
+        0.5 * slope(system, &self.logs, &self.at, levels, aim).1
+    }
+}
+
+/// What is minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aim {
+    /// Minus twice the restricted log-likelihood.
+    Likelihood,
+    /// The same less twice the log of the prior of [`prior`].
+    Posterior,
+}
+
+/// Minus twice the log of the prior density of the log-variances: proportional to [`Likelihood::counts`]. It is flat where
+/// a level is seen well, as Jeffreys' prior of a variance is, so that a level which only a few numbers tell gives Student's
+/// distribution; and it falls with the variance itself below what the noise of the other levels lets be seen, so that a
+/// level of nothing takes the place that it has among the others and no more.
+///
+/// # Reference
+/// Berger & Deely 1988, "A Bayesian approach to ranking and selection of related means", JASA 83, 364–373 (the prior for
+/// one level; it is Jeffreys' up to a constant where all views are alike).
+pub fn prior(at: &Likelihood, levels: Levels) -> f64 {
+    let counts = levels.folded(at.counts);
+    -2.0 * levels.estimated().map(|k| counts[k].max(f64::MIN_POSITIVE).ln()).sum::<f64>()
+}
+
+/// Finds the levels where `aim` is least, beginning at `start`, until a step gains less than `tolerance`.
+pub fn most_likely(
+    system: &System,
+    start: Logs,
+    levels: Levels,
+    aim: Aim,
+    tolerance: f64,
+) -> Result<MostLikely, HandEyeError> {
+    let aimed = |at: &Likelihood| at.value + if aim == Aim::Posterior { prior(at, levels) } else { 0.0 };
+    let mut logs = kept(start, levels);
+    let mut at = evaluate(system, &logs, levels)?;
+    let mut damping = 1e-3;
+    for _ in 0..MAX_STEPS {
+        let (gradient, curvature) = slope(system, &logs, &at, levels, aim);
+        let mut improved = false;
+        while damping < 1e9 {
+            let next_logs = kept(logs + newton_step(&curvature, &gradient, damping), levels);
+            // Levels that leave the answer undetermined are not the ones that are looked for.
+            let next = determined(evaluate(system, &next_logs, levels))?;
+            let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| aimed(&at) - aimed(next));
+            if let (Some(next), true) = (next, gain > 0.0) {
+                (logs, at) = (next_logs, next);
+                damping = (damping * 0.2).max(1e-9);
+                improved = gain > tolerance;
+                break;
+            }
+            damping = (damping * 5.0).max(1e-6);
+        }
+        if !improved {
+            break;
+        }
+    }
+    Ok(MostLikely { logs, at })
+}
+
+/// Levels to search from, with those that are nothing lifted to where the noise of the others begins to hide them. In its log
+/// a level far below makes no difference, so that a search that begins there stays there.
+pub fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, HandEyeError> {
+    /// Part of all numbers of a level that is seen where it starts.
+    const SEEN: f64 = 0.2;
+    let mut logs = kept(to_logs(noise), levels);
+    let counts = evaluate(system, &logs, levels)?.counts;
+    let (robot, field) = (3.0 * system.blocks.len() as f64, HALF as f64);
+    for (k, all) in [(1, robot), (2, robot), (4, field), (5, field)] {
+        let seen = (counts[k] / all).clamp(1e-12, 1.0);
+        if seen < SEEN {
+            logs[k] += (SEEN / seen).ln();
+        }
+    }
+    Ok(logs)
+}
+
+/// Derivatives of what is minimised, the second ones as expected.
+fn slope(system: &System, logs: &Logs, at: &Likelihood, levels: Levels, aim: Aim) -> (Logs, Matrix6<f64>) {
+    let information = information(system, &to_noise(logs, levels), at, levels);
+    let (mut gradient, mut curvature) = (at.gradient, 2.0 * information);
+    if aim == Aim::Posterior {
+        let counts = levels.folded(at.counts);
+        for k in levels.estimated() {
+            // The count of a level grows with its own variance and shrinks with that of the others, which hide it.
+            let count = counts[k].max(f64::MIN_POSITIVE);
+            gradient[k] -= 2.0;
+            gradient += information.column(k) * (4.0 / count);
+            let seen = (2.0 * information[(k, k)] / count).clamp(0.0, 1.0);
+            curvature[(k, k)] += 2.0 * seen * (1.0 - seen);
+        }
+    }
+    (gradient, curvature)
+}
+
+/// The noise levels that maximise the restricted likelihood of a linearised system, from `start`, and minus twice its log; to
+/// a gain of `tolerance`.
+pub fn restricted_likelihood(
+    system: &System,
+    start: &Logs,
+    levels: Levels,
+    tolerance: f64,
+) -> Result<(Noise, f64), HandEyeError> {
+    let found = most_likely(system, *start, levels, Aim::Likelihood, tolerance)?;
+    Ok((to_noise(&found.logs, levels), found.at.value))
+}
+
+/// A step down even where the likelihood is not convex in the logs: eigenvalues are taken by their absolute value.
+fn newton_step(hessian: &Matrix6<f64>, gradient: &Logs, damping: f64) -> Logs {
+    let eigen = hessian.symmetric_eigen();
+    let mut step = Logs::zeros();
+    for i in 0..LEVELS {
+        let direction = eigen.eigenvectors.column(i);
+        let curvature = eigen.eigenvalues[i].abs() + damping * (1.0 + eigen.eigenvalues[i].abs());
+        step -= direction * (direction.dot(gradient) / curvature);
+    }
+    let largest = step.amax();
+    if largest > LARGEST_STEP { step * (LARGEST_STEP / largest) } else { step }
+}

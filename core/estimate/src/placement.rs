@@ -1,0 +1,189 @@
+//! Where an arm stands and what its tool is, from joint angles and reported poses; and whether the two belong together.
+
+use nalgebra::Vector6;
+
+use crate::handeye::closed_form::{ClosedForm as _, Shah};
+use crate::handeye::{HandEyeError, PosePair};
+use handeye_arm::{Arm, ArmError, JointKind};
+use handeye_geometry::frames::{Base, Pose, Tip};
+
+/// Why an arm cannot be placed by joint values and poses.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[non_exhaustive]
+pub enum PlacementError {
+    /// The joint values are of no use.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+    /// An offset of a length, for which an estimate of joint offsets has no place.
+    #[error(
+        "joint {joint} ({name}) is prismatic, and joint offsets are estimated of revolute joints alone: calibrate without \
+         the joint values of this arm"
+    )]
+    PrismaticOffset {
+        /// The joint, counted from 1.
+        joint: usize,
+        /// What it is called.
+        name: String,
+    },
+    /// The poses do not tell where the arm stands and what its tool is.
+    #[error("where the arm stands and where its tip is cannot be told from these poses: {0}")]
+    NotPlaced(#[from] HandEyeError),
+    /// Angles and poses are not of one arm.
+    #[error(
+        "the joint angles do not belong to the poses: {off} of {views} views are off by more than {limit_mm} mm or \
+         {limit_deg}°, most of all view {view}, by {distance_mm:.1} mm and {angle_deg:.2}°; check the order, unit, sign \
+         and zero of the joint angles, the convention of the poses, and which arm it is"
+    )]
+    Foreign {
+        /// The view that is off most, counted from 1.
+        view: usize,
+        /// Distance between its reported tip and the one that its angles give, millimetres.
+        distance_mm: f64,
+        /// Angle between them, degrees.
+        angle_deg: f64,
+        /// How many views are off by more than is allowed.
+        off: usize,
+        /// All views.
+        views: usize,
+        /// Distance that is allowed, millimetres.
+        limit_mm: f64,
+        /// Angle that is allowed, degrees.
+        limit_deg: f64,
+    },
+}
+
+/// How far a reported tip may be from the one that its joint angles give, metres. A controller with the factory's own
+/// calibration is some millimetres from the nominal arm; an error in the columns is centimetres and more. At half a
+/// metre of reach it is 2 % of the twists, and an estimated offset is then 2 % off.
+pub const DISTANCE_LIMIT_M: f64 = 0.010;
+/// The same for the rotation, radians.
+pub const ROTATION_LIMIT_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
+
+/// The robot in one view: the reported pose of the tip, and the joint values in radians (of a prismatic joint in metres).
+#[derive(Debug, Clone, Copy)]
+pub struct JointView<'a> {
+    /// Tip pose as the controller reported it.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// Joint values as the controller reported them: radians, of a prismatic joint metres.
+    pub joints_rad: &'a [f64],
+}
+
+/// How the tip moves with each joint, view by view, see [`Arm::tip_by_joint`].
+pub type TipByJoint = Vec<Vec<Vector6<f64>>>;
+
+/// An arm put where the poses say that it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Placement {
+    /// The arm with `base_from_first` and `flange_from_tip` of the poses.
+    pub arm: Arm,
+    /// Distance in metres and angle in radians between reported tip and that of the joint angles, per view.
+    pub misses: Vec<(f64, f64)>,
+}
+
+impl Placement {
+    /// How the tip moves with each joint in a view that need not be one of those that placed the arm.
+    ///
+    /// # Errors
+    /// [`ArmError::WrongCount`], [`ArmError::NotFinite`], [`PlacementError::PrismaticOffset`]; [`PlacementError::Foreign`] when its
+    /// joint values do not belong to its pose.
+    pub fn tip_by_joint(&self, view: &JointView<'_>) -> Result<Vec<Vector6<f64>>, PlacementError> {
+        let miss = self.arm.forward(view.joints_rad)?.distance_to(&view.base_from_tip);
+        Self { arm: self.arm.clone(), misses: vec![miss] }.check()?;
+        self.by_joint(view)
+    }
+
+    /// How the tip moves with each joint, for an estimate of joint offsets. That takes, states and judges angles: the
+    /// offset of a length has no place in it, and one in radians would be wrong without anybody seeing it.
+    fn by_joint(&self, view: &JointView<'_>) -> Result<Vec<Vector6<f64>>, PlacementError> {
+        let joints = self.arm.joints();
+        if let Some(i) = joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
+            return Err(PlacementError::PrismaticOffset { joint: i + 1, name: joints[i].name.clone() });
+        }
+        Ok(self.arm.tip_by_joint_at(&view.base_from_tip, view.joints_rad)?)
+    }
+
+    /// Root mean square of the distances, metres.
+    pub fn rms_m(&self) -> f64 {
+        let count = self.misses.len().max(1) as f64;
+        (self.misses.iter().map(|miss| miss.0 * miss.0).sum::<f64>() / count).sqrt()
+    }
+
+    /// Whether every view is within [`DISTANCE_LIMIT_M`] and [`ROTATION_LIMIT_RAD`].
+    ///
+    /// # Errors
+    /// [`PlacementError::Foreign`] names the view that is off most.
+    pub fn check(&self) -> Result<(), PlacementError> {
+        // In units of the limits, so that both count; NaN is off.
+        let excess = |miss: &(f64, f64)| (miss.0 / DISTANCE_LIMIT_M).max(miss.1 / ROTATION_LIMIT_RAD);
+        let is_off = |miss: &&(f64, f64)| !(0.0..=1.0).contains(&excess(miss));
+        let off = self.misses.iter().filter(is_off).count();
+        let worst = self.misses.iter().enumerate().max_by(|a, b| excess(a.1).total_cmp(&excess(b.1)));
+        match worst {
+            Some((view, miss)) if off > 0 => Err(PlacementError::Foreign {
+                view: view + 1,
+                distance_mm: miss.0 * 1e3,
+                angle_deg: miss.1.to_degrees(),
+                off,
+                views: self.misses.len(),
+                limit_mm: DISTANCE_LIMIT_M * 1e3,
+                limit_deg: ROTATION_LIMIT_RAD.to_degrees(),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Finds where the arm stands and where its tip is: `base_from_first` and `flange_from_tip` with
+/// `base_from_tip_i = base_from_first · chain(q_i) · flange_from_tip`, whatever `arm` has for them.
+///
+/// This is robot-world calibration, `A X = Z B`, with the chain in the place of the camera; poses that are rounded to a
+/// tenth of a millimetre place the arm as well. A constant error of the first or the last joint goes into the answer.
+///
+/// # Needs
+/// Three views with rotations about two axes.
+///
+/// # Errors
+/// [`ArmError::WrongCount`], [`ArmError::NotFinite`]; [`PlacementError::NotPlaced`] when the poses do not determine it. That
+/// the answer does not fit is for [`Placement::check`].
+pub fn place(arm: &Arm, views: &[JointView<'_>]) -> Result<Placement, PlacementError> {
+    let bare = arm.clone().mounted(nalgebra::Isometry3::identity(), nalgebra::Isometry3::identity());
+    let first_from_flange = views.iter().map(|view| bare.forward(view.joints_rad)).collect::<Result<Vec<_>, _>>()?;
+    let pairs: Vec<PosePair> = views
+        .iter()
+        .zip(&first_from_flange)
+        // H = Z F T reads as F⁻¹ = T H⁻¹ Z: the flange sees the arm's foot as a camera, on the tip at T⁻¹, sees a target
+        // that stands in the base at Z.
+        .map(|(view, pose)| PosePair {
+            anchor_from_mount: view.base_from_tip.relabel(),
+            camera_from_target: pose.inverse().relabel(),
+        })
+        .collect();
+    let found = Shah.solve(&pairs)?;
+    let base_from_first = *found.anchor_from_target.isometry();
+    let flange_from_tip = found.mount_from_camera.isometry().inverse();
+    let misses = views
+        .iter()
+        .zip(&first_from_flange)
+        .map(|(view, pose)| {
+            Pose::from_isometry(base_from_first * pose.isometry() * flange_from_tip).distance_to(&view.base_from_tip)
+        })
+        .collect();
+    Ok(Placement { arm: bare.mounted(base_from_first, flange_from_tip), misses })
+}
+
+/// Finds where the arm stands, see [`place`], checks that joint angles and poses belong together, and says how the tip
+/// moves with each joint in every view, see [`Arm::tip_by_joint_at`].
+///
+/// # Errors
+/// Those of [`place`], [`PlacementError::Foreign`], and [`PlacementError::PrismaticOffset`]: an estimate of joint offsets, which is what
+/// the twists are for, knows revolute joints alone.
+pub fn place_checked(arm: &Arm, views: &[JointView<'_>]) -> Result<(Placement, TipByJoint), PlacementError> {
+    let placement = place(arm, views)?;
+    placement.check()?;
+    let twists = views.iter().map(|view| placement.by_joint(view)).collect::<Result<_, _>>()?;
+    Ok((placement, twists))
+}
+
+#[cfg(test)]
+#[path = "placement_tests.rs"]
+mod tests;

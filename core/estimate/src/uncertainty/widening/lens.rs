@@ -1,0 +1,98 @@
+//! Whether the views agree about an estimated lens.
+//!
+//! What corners say of lens and board beyond the pose of their view rests on hundreds of numbers that are taken for
+//! independent. Errors that neighbours share (blur, light from one side, a print or a lens that does not follow its model
+//! everywhere) make it look several times surer than it is, most where views are little tilted or cover a part of the image,
+//! because the lens then rests on small differences. The views themselves are independent, so the squares of their pulls on fx,
+//! fy, cx and cy are variance shown, as for a camera without a robot.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+use super::{Check, Evidence};
+use crate::handeye::HandEyeError;
+use crate::handeye::joint::view_block::Layout;
+use crate::handeye::joint::{JointProblem, JointSolution};
+use crate::intrinsics::evidence::{Score, scatter};
+use handeye_geometry::progress::Work;
+
+/// fx, fy, cx and cy.
+const PINHOLE: usize = 4;
+
+/// Sum of the squared pulls of single views on the pinhole against what the covariance makes of them; `None` for a given lens.
+pub fn check(
+    problem: &JointProblem<'_>,
+    solution: &JointSolution,
+    work: &Work<'_>,
+) -> Result<Option<Check>, HandEyeError> {
+    if !solution.free.intrinsics {
+        return Ok(None);
+    }
+    let system = solution.linearised(problem)?;
+    let covariance = system.reduce(&solution.noise)?.inverse();
+    let mut scores = Vec::with_capacity(system.blocks.len());
+    for (block, correction) in system.blocks.iter().zip(&system.corrections) {
+        if work.is_cancelled() {
+            return Err(HandEyeError::Cancelled);
+        }
+        let Some((information, gradient)) = block.information(&solution.noise, correction) else { return Ok(None) };
+        scores.push(Score { information, gradient });
+    }
+    // At the optimum nothing is left to go.
+    let step = DVector::zeros(covariance.nrows());
+    let found = scatter(&scores, &covariance, &step, (Layout::FORM_AT, PINHOLE));
+    Ok(found.map(|found| {
+        // As for the answer itself: the noise levels come from six numbers per view less the twelve of the two poses.
+        let of_noise = 6.0 * scores.len() as f64 - 12.0;
+        let law = FisherSnedecor::new(found.degrees_of_freedom, of_noise);
+        Check { by: Evidence::Lens, ratio: found.ratio, p_value: law.map_or(f64::NAN, |law| law.sf(found.ratio)) }
+    }))
+}
+
+/// A covariance with that of some unknowns, the lens, multiplied by a factor: what the others owe to the lens grows with it, and
+/// what they would be unsure of with a lens that is known stays.
+///
+/// With `C` the covariance and `K = C_·l C_ll⁻¹` how all unknowns follow the lens, it is `C + (factor − 1) K C_ll Kᵀ`.
+#[must_use]
+pub fn of_lens(covariance: &DMatrix<f64>, lens: Range<usize>, factor: f64) -> DMatrix<f64> {
+    let of_all = covariance.columns(lens.start, lens.len()).into_owned();
+    let of_lens = covariance.view((lens.start, lens.start), (lens.len(), lens.len()));
+    // Focal lengths and coefficients differ by many orders.
+    let scale: Vec<f64> = of_lens.diagonal().iter().map(|v| v.max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+    let scaled = DMatrix::from_fn(lens.len(), lens.len(), |i, j| of_lens[(i, j)] * scale[i] * scale[j]);
+    let Some(root) = scaled.cholesky().map(|factor| factor.l()) else { return covariance * factor };
+    let to_lens = DMatrix::from_fn(lens.len(), of_all.nrows(), |i, j| of_all[(j, i)] * scale[i]);
+    let Some(owed) = root.solve_lower_triangular(&to_lens) else { return covariance * factor };
+    covariance + owed.tr_mul(&owed) * (factor - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_less_known_lens_costs_what_rests_on_it_and_nothing_else() {
+        // The first unknown is a quarter of the lens and some noise of its own, the second has nothing to do with it.
+        let (own, lens) = (0.3f64, DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 9.0]));
+        let to = [0.25, 0.0];
+        let with = |times: f64| {
+            let lens = &lens * times;
+            let mut c = DMatrix::zeros(4, 4);
+            c.view_mut((2, 2), (2, 2)).copy_from(&lens);
+            let by = DVector::from_column_slice(&to);
+            let cross = &lens * &by;
+            for k in 0..2 {
+                c[(0, 2 + k)] = cross[k];
+                c[(2 + k, 0)] = cross[k];
+            }
+            c[(0, 0)] = by.dot(&cross) + own;
+            c[(1, 1)] = 2.0;
+            c
+        };
+        let widened = of_lens(&with(1.0), 2..4, 5.0);
+        assert!((&widened - with(5.0)).amax() < 1e-12, "{widened}");
+        assert!((of_lens(&widened, 2..4, 0.2) - with(1.0)).amax() < 1e-12);
+    }
+}

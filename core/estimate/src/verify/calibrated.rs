@@ -1,0 +1,197 @@
+//! What of a calibration is needed to predict what the camera sees.
+
+use nalgebra::{DMatrix, Matrix6, Vector2};
+
+use super::VerifyError;
+use crate::diagnose::Calibration;
+use crate::handeye::HandEye;
+use crate::handeye::joint::{
+    CornerWeights, DepthWeight, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
+};
+use crate::resolution;
+use crate::uncertainty::quality;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+use handeye_geometry::targets::depth_plane::DepthPlane;
+use handeye_geometry::targets::observation::{Corner, Corners, View};
+use handeye_geometry::view_equations::{DepthBias, MeasuredDepths, ViewInput, Whitener};
+
+/// What of a calibration is needed to predict.
+#[derive(Debug, Clone)]
+pub struct Predictor {
+    /// Both rigid links.
+    pub hand_eye: HandEye,
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// The shape of the target.
+    pub shape: BoardShape,
+    /// What the points of the target are off their drawing, metres; empty where the calibration found nothing of the kind.
+    pub print_errors_m: Vec<Vector2<f64>>,
+    /// Offsets of the joints that the calibration counts on, to be added to the reported angles, radians; empty where it
+    /// counts on none.
+    pub joint_offsets_rad: Vec<f64>,
+    /// Errors of the robot that depend on where it stands, where the calibration found them.
+    pub field: Option<RobotField>,
+    /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
+    pub hand_eye_covariance: Option<Matrix6<f64>>,
+    /// How the error of the hand-eye transform is distributed in units of that covariance.
+    pub small_sample: SmallSample,
+    /// What says how large errors may be; of a joint estimate.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+/// How uncertain a prediction is.
+#[derive(Debug, Clone)]
+pub struct Uncertainty {
+    /// Noise levels of robot and corners.
+    pub noise: Noise,
+    /// How corners count against each other, see [`JointFit::weights`](crate::JointFit::weights).
+    pub weights: Option<CornerWeights>,
+    /// The errors of depths and how they count; `None` where the calibration does not count on them.
+    pub depths: Option<(DepthBias, DepthWeight)>,
+    /// What was estimated besides the links.
+    pub free: Free,
+    /// Covariance of everything that predictions share, as in
+    /// [`JointSolution::covariance`](crate::handeye::joint::JointSolution::covariance).
+    pub covariance: DMatrix<f64>,
+}
+
+impl Predictor {
+    /// What is known exactly: a flat board of the size that is stated, and a robot without errors. States no uncertainty.
+    pub fn known(hand_eye: HandEye, intrinsics: Intrinsics) -> Self {
+        Self {
+            hand_eye,
+            intrinsics,
+            shape: BoardShape::default(),
+            print_errors_m: Vec::new(),
+            joint_offsets_rad: Vec::new(),
+            field: None,
+            hand_eye_covariance: None,
+            small_sample: SmallSample::KNOWN,
+            uncertainty: None,
+        }
+    }
+
+    /// Takes what it needs from a calibration.
+    ///
+    /// # Errors
+    /// [`VerifyError::NoHandEye`], [`VerifyError::NoIntrinsics`].
+    pub fn new(calibration: &Calibration) -> Result<Self, VerifyError> {
+        let hand_eye = calibration.hand_eye.ok_or(VerifyError::NoHandEye)?;
+        let intrinsics = calibration.intrinsics().ok_or(VerifyError::NoIntrinsics)?;
+        let joint = calibration.joint.as_ref();
+        let uncertainty = joint.map(|joint| Uncertainty {
+            noise: joint.noise,
+            weights: joint.weights,
+            depths: joint.depths.as_ref().and_then(|depths| {
+                let weight = depths.in_fit.weight()?;
+                // What no depth camera resolves is no error of a calibration.
+                let px_per_m = weight.px_per_m.min(joint.noise.corner_px / resolution::DEPTH_M);
+                Some((depths.bias, DepthWeight { px_per_m, ..weight }))
+            }),
+            free: joint.free,
+            covariance: joint.covariance.clone(),
+        });
+        let offsets = joint.and_then(|joint| joint.joint_offsets.as_ref()).filter(|offsets| offsets.accepted);
+        Ok(Self {
+            hand_eye,
+            intrinsics,
+            shape: joint.and_then(|joint| joint.shape).map_or_else(BoardShape::default, |estimate| estimate.shape),
+            print_errors_m: joint
+                .and_then(|joint| joint.print.as_ref())
+                .map_or_else(Vec::new, |it| it.errors_m.clone()),
+            joint_offsets_rad: offsets.map_or_else(Vec::new, |offsets| offsets.offsets_rad.clone()),
+            field: joint.and_then(|joint| joint.field.clone()),
+            hand_eye_covariance: calibration.hand_eye_covariance().copied(),
+            small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
+            uncertainty,
+        })
+    }
+
+    /// The points of the target as they are printed; those of another target are as they are drawn.
+    pub fn board(&self, target: &TargetSpec) -> BoardPoints {
+        let drawn = BoardPoints::new(&target.points());
+        if drawn.len() == self.print_errors_m.len() { drawn.displaced(&self.print_errors_m) } else { drawn }
+    }
+
+    /// Where the tip is when the robot reports what it does in this view: with the offsets of the joints and the robot's
+    /// field taken out.
+    ///
+    /// # Errors
+    /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] when there are offsets and the view does not say how its tip
+    /// moves with the joints.
+    pub fn base_from_tip(&self, view: &View) -> Result<Pose<Base, Tip>, VerifyError> {
+        if !view.base_from_tip.is_finite() {
+            return Err(VerifyError::NotFinite { name: view.name.clone() });
+        }
+        if view.tip_by_joint.len() < self.joint_offsets_rad.len() {
+            return Err(VerifyError::NoJoints { name: view.name.clone() });
+        }
+        Ok(corrected_base_from_tip(view, &self.joint_offsets_rad, self.field.as_ref()))
+    }
+
+    /// Where the camera is when the tip is there.
+    pub fn base_from_camera(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Camera> {
+        match self.hand_eye {
+            HandEye::EyeInHand { tip_from_camera, .. } => *base_from_tip * tip_from_camera,
+            HandEye::EyeToHand { base_from_camera, .. } => base_from_camera,
+        }
+    }
+
+    /// Where the camera sees the board when the tip is there: the bare chain.
+    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
+        camera_from_target(
+            self.hand_eye.mode(),
+            base_from_tip,
+            &self.hand_eye.mount_from_camera(),
+            &self.hand_eye.anchor_from_target(),
+        )
+    }
+
+    /// How the corners of an image count.
+    pub(super) fn whitener(&self, corners: &Corners) -> Whitener {
+        let weights = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.weights);
+        weights.map_or(Whitener::Alike, |weights| weights.whitener(corners))
+    }
+
+    /// A view through the calibrated lens, with the whitener of its corners.
+    pub(super) fn view_input<'a>(
+        &'a self,
+        board: &'a BoardPoints,
+        (corners, depth): (&'a [Corner], Option<&'a DepthPlane>),
+        whitener: &'a Whitener,
+    ) -> ViewInput<'a> {
+        let counted = self.uncertainty.as_ref().and_then(|uncertainty| uncertainty.depths.as_ref());
+        let depths = counted.zip(depth);
+        ViewInput {
+            intrinsics: &self.intrinsics,
+            board,
+            shape: &self.shape,
+            corners,
+            whitener,
+            depths: depths.map(|((bias, weight), plane)| MeasuredDepths { plane, bias, px_per_m: weight.px_per_m }),
+        }
+    }
+
+    /// The board's pose in one image, by its corners and the shape that the calibration found, from its pose as a flat
+    /// board of the stated size; by its depths too, where there are some and the calibration counts on them. That a board is 2 %
+    /// larger than stated puts it 2 % farther away.
+    ///
+    /// `None` when that puts a corner behind the camera, or a corner is no point of this board.
+    pub fn seen(
+        &self,
+        board: &BoardPoints,
+        (corners, depth): (&Corners, Option<&DepthPlane>),
+        flat: &Pose<Camera, Target>,
+    ) -> Option<Pose<Camera, Target>> {
+        if corners.iter().any(|corner| corner.index >= board.len()) {
+            return None;
+        }
+        let mut start = *flat.isometry();
+        start.translation.vector *= self.shape.scale;
+        let whitener = self.whitener(corners);
+        quality::weighted_pose_of_view(&self.view_input(board, (corners, depth), &whitener), &start)
+    }
+}

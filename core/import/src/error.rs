@@ -1,0 +1,157 @@
+//! Why a recording cannot be imported.
+
+use std::path::{Path, PathBuf};
+
+use handeye_estimate::clock_offset::ClockOffsetError;
+use handeye_files::budget::Spent;
+use handeye_wording::Text;
+use handeye_wording::text;
+
+/// Why a recording cannot be read or a data set not be written. One line each: what, where, and what to do.
+#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// The file system says no.
+    #[error("{file}: cannot be read: {why}", file = file.display())]
+    Unreadable {
+        /// The file or folder.
+        file: PathBuf,
+        /// What the system says.
+        why: String,
+    },
+    /// More than any recording has.
+    #[error("{file}: {what}: at most {limit} are read; name the folder of one recording", file = file.display())]
+    TooMuch {
+        /// The file or folder.
+        file: PathBuf,
+        /// What there is too much of.
+        what: &'static str,
+        /// What is read.
+        limit: u64,
+    },
+    /// It takes more time, or unpacks to more, than a person has allowed.
+    #[error("{file}: {why}{allowing}", file = file.display(), allowing = allowing(*why))]
+    Stopped {
+        /// The folder or file.
+        file: PathBuf,
+        /// Why it was stopped.
+        why: Spent,
+    },
+    /// It is a data set or a session already.
+    #[error("{file} is a data set or a session already: solve it with `handeye calibrate`", file = .0.display())]
+    AlreadyADataset(PathBuf),
+    /// There is nothing that could be robot poses.
+    #[error(
+        "{folder}: no series of at least {need} poses was found (tables, JSON, YAML, XML, npz and bags of ROS are read): {seen}",
+        folder = folder.display()
+    )]
+    NoPoses {
+        /// The folder.
+        folder: PathBuf,
+        /// How many poses a calibration needs.
+        need: usize,
+        /// What was found instead.
+        seen: Text,
+    },
+    /// The robot was at one place all the time.
+    #[error(
+        "{folder}: the robot did not move: the {count} poses of {series} are {alike}; a calibration needs poses that are turned by 30° or more \
+         about two different axes",
+        folder = folder.display(),
+        alike = alike(*spread_mm_deg)
+    )]
+    DidNotMove {
+        /// The folder.
+        folder: PathBuf,
+        /// The robot's poses.
+        series: String,
+        /// How many they are.
+        count: usize,
+        /// How far they are apart at the most, millimetres and degrees; `None` where their numbers are the same.
+        spread_mm_deg: Option<(f64, f64)>,
+    },
+    /// No way to put the files together has views to solve with.
+    #[error(
+        "{folder}: no pairing has {need} views with a pose of the robot and the target in sight, turned differently: look at the \
+         target, at `images` and at `poses`",
+        folder = folder.display()
+    )]
+    NoViews {
+        /// The folder.
+        folder: PathBuf,
+        /// How many views a solution needs.
+        need: usize,
+    },
+    /// Poses cannot be made of joint values.
+    #[error("arm = {arm:?}: {why}")]
+    Arm {
+        /// As it was named.
+        arm: String,
+        /// What is wrong.
+        why: Text,
+    },
+    /// Images of a moving robot have stamps of a clock that cannot be related to the robot's.
+    #[error("the images {images} were taken while {poses} moved, and their clocks cannot be related: {why}")]
+    Clocks {
+        /// The stream of images.
+        images: String,
+        /// The robot's poses.
+        poses: String,
+        /// Why not.
+        why: ClockOffsetError,
+    },
+    /// A choice that is none.
+    #[error("{key} = {value:?} is not a choice here: {choices}")]
+    BadChoice {
+        /// The key.
+        key: String,
+        /// What was given.
+        value: String,
+        /// What may be given.
+        choices: Text,
+    },
+    /// What was chosen excludes everything.
+    #[error("nothing is left to try with {0}: these choices exclude each other, or the recording does not have them")]
+    NothingLeft(&'static str),
+    /// The folder to write is there and has something in it.
+    #[error("{file}: is not empty: an import is written into a new folder, name another one", file = .0.display())]
+    OutNotEmpty(PathBuf),
+    /// It could not be written.
+    #[error("{file}: cannot be written: {why}", file = file.display())]
+    Unwritable {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        why: String,
+    },
+}
+
+impl ImportError {
+    pub(super) fn stopped(file: &Path, why: Spent) -> Self {
+        Self::Stopped { file: file.to_path_buf(), why }
+    }
+}
+
+/// Several reasons as one.
+pub(super) fn reasons(all: Vec<Text>) -> Text {
+    let joined = all.into_iter().reduce(|first, next| text!("{first}; {next}", first = first, next = next));
+    joined.unwrap_or_default()
+}
+
+/// What to do about it.
+fn allowing(why: Spent) -> Text {
+    match why {
+        Spent::Cancelled => Text::default(),
+        Spent::Time(_) => {
+            text!(": name the folder or file of one recording, or allow more time with --time SECONDS")
+        }
+        Spent::Unpacked(_) => text!(": unpack them yourself, or allow more with --unpack GIB"),
+    }
+}
+
+fn alike(spread_mm_deg: Option<(f64, f64)>) -> Text {
+    spread_mm_deg.map_or_else(
+        || text!("all the same"),
+        |(mm, deg)| text!("the same within {mm} mm and {deg}°", mm = format!("{mm:.2}"), deg = format!("{deg:.2}")),
+    )
+}

@@ -1,0 +1,93 @@
+//! ViSP: a `vpPoseVector` to a file (three translations, then the rotation vector, metres and radians), a camera in XML, and
+//! the target as text.
+
+use super::tree;
+use crate::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use crate::recording::{FoundCamera, FoundTarget, Known, Role, Stated, Track};
+use crate::value::{self, Value};
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::targets::{AprilTag, Dictionary, Grid, TargetSpec};
+
+/// Whether a document is a vector of six numbers as ViSP saves it.
+pub(crate) fn is_pose(value: &Value) -> bool {
+    value.get("rows").and_then(Value::whole) == Some(6)
+        && value.get("cols").and_then(Value::whole) == Some(1)
+        && value.numbers(6).is_some_and(|numbers| numbers.len() == 6)
+}
+
+/// What is known of a series of such files.
+pub(crate) fn know(track: &mut Track) {
+    let by = |what: &str| format!("ViSP's pose vectors are {what}");
+    track.stated = Stated {
+        length: Some(Known::by(by("in metres"), LengthUnit::Metre)),
+        angle: Some(Known::by(by("in radians"), AngleUnit::Radian)),
+        rotation: Some(Known::by(by("translation and rotation vector"), vec![RotationForm::Vector])),
+        ..Stated::default()
+    };
+    track.role = tree::role(&track.name);
+    // aPb is the pose of b in a.
+    if track.name.contains("rPe") || track.name.contains("wPe") || track.name.contains("fPe") {
+        track.role = Role::Robot;
+        track.stated.direction =
+            Some(Known::by("rPe is ViSP's name of the effector in the reference", Direction::Forward));
+    } else if track.name.contains("cPo") {
+        track.role = Role::Target;
+        track.stated.direction = Some(Known::by("cPo is ViSP's name of the object in the camera", Direction::Forward));
+    }
+}
+
+/// A camera from ViSP's XML.
+pub(crate) fn camera(text: &str, file: &str) -> Option<FoundCamera> {
+    let document = value::xml(text).ok()?;
+    let camera = document.descendants().find(|node| node.has_tag_name("camera"))?;
+    let number = |name: &str| -> Option<f64> {
+        camera.descendants().find(|node| node.has_tag_name(name))?.text()?.trim().parse().ok()
+    };
+    let (width, height) = (number("image_width").unwrap_or(0.0), number("image_height").unwrap_or(0.0));
+    let kud = number("kud").unwrap_or(0.0);
+    let distortion = if kud == 0.0 { Distortion::None } else { Distortion::BrownConrady([kud, 0.0, 0.0, 0.0, 0.0]) };
+    Some(FoundCamera {
+        name: file.to_owned(),
+        intrinsics: Intrinsics {
+            width: width as u32,
+            height: height as u32,
+            fx: number("px")?,
+            fy: number("py")?,
+            cx: number("u0")?,
+            cy: number("v0")?,
+            distortion,
+        },
+        why: "a camera of ViSP",
+    })
+}
+
+/// A target from the note that lies beside ViSP's data: `Chessboard`, `9 x 6`, `square size: 0.0236 m`, or the family of a tag
+/// and its size, without its number.
+pub(crate) fn target(text: &str, file: &str) -> Option<FoundTarget> {
+    let lower = text.to_lowercase();
+    let size = |key: &str| -> Option<f64> {
+        let rest = lower.split_once(key)?.1;
+        let mut words = rest.split_whitespace();
+        let value: f64 = words.next()?.parse().ok()?;
+        match words.next() {
+            Some("m") => Some(value),
+            Some("mm") => Some(value * 1e-3),
+            _ => None,
+        }
+    };
+    let found = |target: TargetSpec, is_id_open: bool| FoundTarget { target, file: file.to_owned(), is_id_open };
+    if lower.contains("36h11") {
+        let family = "apriltag_36h11".parse::<Dictionary>().ok()?;
+        let tag = AprilTag { tag_m: size("size:")?, id: 0, family, border_bits: Some(1) };
+        return Some(found(TargetSpec::AprilTag(tag), true));
+    }
+    if !lower.contains("chessboard") {
+        return None;
+    }
+    let words: Vec<&str> = lower.split_whitespace().collect();
+    let (columns, rows) = words.windows(3).find_map(|w| match w {
+        [columns, "x", rows] => Some((columns.parse().ok()?, rows.parse().ok()?)),
+        _ => None,
+    })?;
+    Some(found(TargetSpec::Chessboard(Grid { columns, rows, square_m: size("size:")? }), false))
+}

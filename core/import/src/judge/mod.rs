@@ -1,0 +1,314 @@
+//! The hypotheses about a recording, tried against what the camera saw.
+//!
+//! Under each of them closed forms are solved, and the distance between where the chain puts the target and where it was seen
+//! is measured on the camera's side in metres, so that it means the same under all of them: as the [doctor](handeye_estimate::diagnose::doctor)
+//! does with gross faults.
+//!
+//! Poses that map the other way with the camera in the other place give the same equations, so no data tell them apart. Both
+//! are listed; the one that puts the camera nearer to what carries it than the target is comes first.
+
+mod cases;
+mod field_of_view;
+mod own_poses;
+mod scale;
+mod trial;
+mod turns;
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use super::error::ImportError;
+use super::formats::tree::LEAST_POSES;
+use super::hypothesis::{Hypothesis, Source};
+use super::recording::Recording;
+use super::settings::Settings;
+use super::sight::Sight;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use trial::Judge;
+
+/// A hypothesis that explains the views leaves less than this part of the target's distance.
+pub(crate) const EXPLAINED: f64 = 0.05;
+/// And at the median a smaller angle \[rad\] than this: the same part of a turn by one radian.
+pub(crate) const EXPLAINED_RAD: f64 = 0.05;
+/// And another one is ruled out when it leaves so many times more.
+pub const TIMES: f64 = 3.0;
+/// Views with which hypotheses can be told apart: with three any of them fits.
+pub const NEED: usize = 4;
+/// A hypothesis that leaves less than this part of the target's distance needs no second look at the others.
+const CLEAR: f64 = 0.01;
+/// Views that are looked at to sort hypotheses.
+const MOST_QUICK: usize = 20;
+/// Hypotheses whose equations are solved, and of those the ones that may leave views out, which takes some ten times as long.
+/// Some hundreds of either are what a recording of one robot has; with so many a person waits for some seconds.
+const MOST_SOLVED: usize = 5000;
+const MOST_ROBUST: usize = 500;
+/// Hypotheses that are judged thoroughly.
+const MOST_JUDGED: usize = 40;
+/// Hypotheses that are kept for the list.
+const MOST_LISTED: usize = 24;
+/// Within this factor two hypotheses explain the same, and the commoner one comes first: a median of a dozen views is known no
+/// better.
+const TIE: f64 = 1.25;
+/// Poses of two series that differ by less than this [m, rad] are copies of each other, rounded otherwise.
+const COPY: f64 = 1e-4;
+
+/// What was seen in each source: streams by their corners, series by themselves.
+#[derive(Debug, Default)]
+pub struct Sights {
+    /// Of [`Recording::streams`], where the target was found.
+    pub streams: Vec<Option<Sight>>,
+    /// The target, where it is known.
+    pub target: Option<TargetSpec>,
+}
+
+/// All hypotheses and what follows.
+#[derive(Debug)]
+pub struct Judgement {
+    /// The best first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// How many were tried.
+    pub tried: usize,
+    /// How many more there are, which were not: more than one can tell apart. A person who names series leaves fewer.
+    pub untried: usize,
+    /// How many pairs of a series of the robot and of what the camera saw were not looked at.
+    pub sources_untried: usize,
+    /// Median distance of the target from the camera under the best, metres.
+    pub distance_m: f64,
+    /// What follows.
+    pub verdict: Verdict,
+}
+
+impl Judgement {
+    /// Whether all that is open is where the camera sits, which no data tell: the same files, pairing and numbers explain the
+    /// recording in both places.
+    pub fn is_open_in_mode_alone(&self) -> bool {
+        match self.hypotheses.as_slice() {
+            [a, b, ..] if self.verdict == Verdict::Ambiguous(2) => {
+                a.mode != b.mode
+                    && (a.source, a.robot, a.reading, a.target_reading)
+                        == (b.source, b.robot, b.reading, b.target_reading)
+                    && a.pairing.image_of == b.pairing.image_of
+            }
+            _ => false,
+        }
+    }
+}
+
+/// What follows from the hypotheses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// The first is the only one that explains the views.
+    Decided,
+    /// The first so many explain them about as well: a person has to say which it is.
+    Ambiguous(usize),
+    /// None explains them.
+    Unexplained,
+}
+
+/// Tries every hypothesis that the files and the settings leave open.
+///
+/// # Errors
+/// [`ImportError::NoPoses`] without a series to try, [`ImportError::NothingLeft`] where settings exclude all,
+/// [`ImportError::BadChoice`] for a name that there is not, [`ImportError::NoViews`] where nothing has a solution.
+pub fn judge(
+    recording: &Recording,
+    sights: &Sights,
+    settings: &Settings,
+    cancel: &CancelToken,
+) -> Result<Judgement, ImportError> {
+    let (paired, sources_untried) = cases::sources(recording, sights, settings)?;
+    let (mut cases, mut untried) = cases::cases(recording, &paired, settings);
+    if cases.is_empty() {
+        return Err(ImportError::NothingLeft("these settings"));
+    }
+    let (read, own) = (RefCell::default(), RefCell::default());
+    let judge = Judge { recording, sights, paired: &paired, settings, cancel, read, own };
+    let tried = cases.len();
+    untried += turns::keep_alike(&judge, &mut cases, MOST_SOLVED);
+    let mut quick: Vec<(f64, usize)> = Vec::with_capacity(tried);
+    for robust in [false, true] {
+        // A pairing of which a part is wrong spoils a plain solution: then each hypothesis is given the chance to leave
+        // views out, those first in which robot and target turn alike, which wrong views do not spoil.
+        let mut chosen: Vec<usize> = (0..cases.len()).collect();
+        if robust && chosen.len() > MOST_ROBUST {
+            chosen.sort_by(|a, b| cases[*a].apart_rad.total_cmp(&cases[*b].apart_rad));
+            chosen.truncate(MOST_ROBUST);
+            let again: BTreeSet<usize> = chosen.iter().copied().collect();
+            quick.retain(|(_, i)| !again.contains(i));
+        } else {
+            quick.clear();
+        }
+        for i in chosen {
+            let case = &cases[i];
+            if cancel.is_cancelled() {
+                break;
+            }
+            let fit = judge.solve(case, MOST_QUICK, robust).map(|(_, median_m)| median_m / judge.distance_of(case));
+            quick.push((fit.unwrap_or(f64::INFINITY), i));
+        }
+        quick.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = quick.first().map_or(f64::INFINITY, |(fit, _)| *fit);
+        if best < CLEAR {
+            break;
+        }
+    }
+    let mut chosen: Vec<usize> = quick.iter().take(MOST_JUDGED).map(|(_, i)| *i).collect();
+    // The best of every pairing is worth a look, whatever else is better.
+    for number in 0..paired.len() {
+        if chosen.len() >= 2 * MOST_JUDGED {
+            break;
+        }
+        if let Some((_, i)) = quick.iter().find(|(_, i)| cases[*i].pairing == number)
+            && !chosen.contains(i)
+        {
+            chosen.push(*i);
+        }
+    }
+    let mut hypotheses: Vec<Hypothesis> = chosen.iter().flat_map(|i| judge.judged(&cases[*i])).collect();
+    if hypotheses.iter().all(|h| h.fit.is_none()) && !cancel.is_cancelled() {
+        if let Some(stood) = cases::did_not_move(recording, &paired, settings) {
+            return Err(stood);
+        }
+        return Err(ImportError::NoViews { folder: recording.root.clone(), need: LEAST_POSES });
+    }
+    sort(recording, &mut hypotheses);
+    let mended = judge.mended(&hypotheses);
+    hypotheses.extend(mended);
+    judge.contradict_own_poses(&mut hypotheses);
+    judge.contradict_outside(&mut hypotheses);
+    merge_equal(recording, &mut hypotheses);
+    scale::contradict(&judge, &mut hypotheses);
+    sort(recording, &mut hypotheses);
+    hypotheses.truncate(MOST_LISTED);
+    let distance_m = hypotheses.first().map_or(0.0, |h| judge.sight_distance(h));
+    let verdict = verdict(&mut hypotheses);
+    Ok(Judgement { hypotheses, tried, untried, sources_untried, distance_m, verdict })
+}
+
+fn verdict(hypotheses: &mut [Hypothesis]) -> Verdict {
+    // Those that explain come first, also before a better fit that is contradicted.
+    hypotheses.sort_by_key(|h| !h.explains());
+    let alone = hypotheses.len() == 1;
+    let Some(best) = hypotheses.first().filter(|best| best.explains()) else { return Verdict::Unexplained };
+    let (limit, views) = best.fit.as_ref().map_or((0.0, 0), |fit| (TIMES * fit.relative.max(1e-4), fit.views));
+    let is_near =
+        |h: &&Hypothesis| h.explains() && h.fit.as_ref().is_some_and(|fit| fit.relative <= limit || fit.views < NEED);
+    let near = hypotheses.iter().take_while(is_near).count();
+    // With too few views to tell hypotheses apart, all of them are open. What was paired by what the images show rests on
+    // the answer itself.
+    if near == 1 && !best.pairing.is_by_content && (views >= NEED || alone) {
+        Verdict::Decided
+    } else {
+        Verdict::Ambiguous(near)
+    }
+}
+
+/// How common something is; fewer is commoner.
+fn rarity(recording: &Recording, h: &Hypothesis) -> (usize, usize, usize, usize, usize) {
+    // Which of the two places of the camera is the likelier one.
+    let far = h.fit.as_ref().is_some_and(|fit| (fit.camera_at_m < fit.target_at_m) != (h.mode == Mode::EyeInHand));
+    let numbers = recording.tracks[h.robot].samples.first().map(|s| s.numbers);
+    let forms = numbers.map(|n| RotationForm::all_for(&n)).unwrap_or_default();
+    let rotation = forms.iter().position(|form| *form == h.reading.rotation).unwrap_or(99);
+    let unit = LengthUnit::ALL.iter().position(|unit| *unit == h.reading.length).unwrap_or(9);
+    let angle = usize::from(h.reading.angle == AngleUnit::Degree);
+    (
+        usize::from(h.pairing.is_by_content),
+        usize::from(far),
+        unit + angle,
+        usize::from(h.direction == Direction::Inverse),
+        rotation,
+    )
+}
+
+fn sort(recording: &Recording, hypotheses: &mut [Hypothesis]) {
+    let median_of = |h: &Hypothesis| h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
+    hypotheses.sort_by(|a, b| {
+        median_of(a).total_cmp(&median_of(b)).then_with(|| rarity(recording, a).cmp(&rarity(recording, b)))
+    });
+    // Runs of equals, each measured by its first.
+    let mut start = 0;
+    while start < hypotheses.len() {
+        let limit = TIE * median_of(&hypotheses[start]) + 1e-7;
+        let end = start + hypotheses[start..].iter().take_while(|h| median_of(h) <= limit).count().max(1);
+        hypotheses[start..end].sort_by(|a, b| {
+            let views = |h: &Hypothesis| h.fit.as_ref().map_or(0, |fit| fit.views);
+            (rarity(recording, a), views(b)).cmp(&(rarity(recording, b), views(a)))
+        });
+        start = end;
+    }
+}
+
+/// Hypotheses that give the same poses are one; what the others are called is kept.
+fn merge_equal(recording: &Recording, hypotheses: &mut Vec<Hypothesis>) {
+    let mut out: Vec<Hypothesis> = Vec::new();
+    for h in hypotheses.drain(..) {
+        let same = out.iter_mut().find(|known| {
+            known.mode == h.mode && sees_the_same(recording, known, &h) && poses_are_equal(recording, known, &h)
+        });
+        match same {
+            Some(known) if known.robot != h.robot || known.source != h.source => {
+                let (of, from) = (&recording.tracks[h.robot].name, h.target_series(recording));
+                let name = from.map_or_else(|| of.clone(), |from| format!("{of} with {from}"));
+                if !known.same_as.contains(&name) {
+                    known.same_as.push(name);
+                }
+            }
+            Some(known) if known.reading == h.reading && known.direction == h.direction => {}
+            Some(known) => known.same_as.push(h.reading.rotation.to_string()),
+            None => out.push(h),
+        }
+    }
+    *hypotheses = out;
+}
+
+/// Whether what the camera saw is the same: the same images, or poses of the target that are the same numbers or copies.
+fn sees_the_same(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool {
+    if a.source == b.source {
+        return a.target_reading == b.target_reading;
+    }
+    let (Source::Track(of_a), Source::Track(of_b)) = (a.source, b.source) else { return false };
+    let (of_a, of_b) = (&recording.tracks[of_a].samples, &recording.tracks[of_b].samples);
+    of_a.len() == of_b.len()
+        && of_a.iter().zip(of_b).all(|(of_a, of_b)| match (a.camera_from_target(of_a), b.camera_from_target(of_b)) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (Pose::<Camera, Target>::from_isometry(a), Pose::<Camera, Target>::from_isometry(b));
+                is_copy(a.distance_to(&b))
+            }
+            (a, b) => a.is_none() && b.is_none(),
+        })
+}
+
+/// Whether every image has the same pose of the robot under both, however it is written and wherever it stands.
+fn poses_are_equal(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool {
+    let by_image = |h: &Hypothesis| -> BTreeMap<usize, Option<Pose<Base, Tip>>> {
+        let samples = &recording.tracks[h.robot].samples;
+        let pose = |(sample, image): (usize, &Option<usize>)| Some(((*image)?, h.base_from_tip(samples.get(sample)?)));
+        h.pairing.image_of.iter().enumerate().filter_map(pose).collect()
+    };
+    let is_same_series = a.robot == b.robot;
+    if is_same_series && a.pairing.image_of != b.pairing.image_of {
+        return false;
+    }
+    let (of_a, of_b) = (by_image(a), by_image(b));
+    of_a.len() == of_b.len()
+        && of_a.iter().zip(&of_b).all(|((image_a, a), (image_b, b))| {
+            image_a == image_b
+                && match (a, b) {
+                    (Some(a), Some(b)) if is_same_series => {
+                        let (metres, radians) = a.distance_to(b);
+                        metres < 1e-9 && radians < 1e-7
+                    }
+                    (Some(a), Some(b)) => is_copy(a.distance_to(b)),
+                    (a, b) => a.is_none() && b.is_none(),
+                }
+        })
+}
+
+fn is_copy((metres, radians): (f64, f64)) -> bool {
+    metres < COPY && radians < COPY
+}

@@ -1,0 +1,168 @@
+//! What is said of a recording in which no series of poses was found: what its files have instead, and what to do.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::folder;
+use super::formats::{blocks, npz, table, tree, xml};
+use super::value::{self, Value};
+use handeye_files::budget::Budget;
+use handeye_wording::Text;
+use handeye_wording::text;
+
+/// Files of text that are told of.
+const MOST_TOLD: usize = 5;
+/// Groups of files among which those are looked for, and the bytes of one: a person waits for the answer.
+const MOST_LOOKED_AT: usize = 200;
+const LARGEST: u64 = 1 << 20;
+
+/// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
+pub(super) fn reasons(root: &Path, files: &[PathBuf], budget: &Budget<'_>) -> Vec<Text> {
+    let mut told: Vec<(Likely, Text)> = Vec::new();
+    for members in folder::groups(files, true).iter().take(MOST_LOOKED_AT) {
+        let Some((first, _)) = members.first().filter(|_| !budget.is_spent()) else { continue };
+        let Some((likely, why)) = reason(&root.join(first), budget) else { continue };
+        let shown = folder::shown(members.iter().map(|(file, _)| file.as_path()));
+        let name = if members.len() == 1 { first.display().to_string() } else { shown };
+        told.push((likely, text!("{name} has {why}", name = name, why = why)));
+    }
+    told.sort_by_key(|(likely, _)| *likely);
+    let mut reasons: Vec<Text> = told.into_iter().take(MOST_TOLD).map(|(_, why)| why).collect();
+    let not_read: BTreeMap<String, Text> =
+        files.iter().filter_map(|file| not_read(file)).map(|why| (why.to_string(), why)).collect();
+    reasons.extend(not_read.into_values());
+    reasons
+}
+
+/// How likely a file was meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Likely {
+    Poses,
+    Numbers,
+    Neither,
+}
+
+/// What to do with a file of a format that is not read.
+fn not_read(file: &Path) -> Option<Text> {
+    Some(match folder::ending(file).as_str() {
+        "mat" => text!("files of MATLAB (.mat) are not read: save the poses as csv, npz or json"),
+        "pkl" | "pickle" => {
+            text!("pickles (.pkl) are not read, as reading one runs it: save the poses as csv, npz or json")
+        }
+        "xls" | "xlsx" | "ods" => text!("spreadsheets are not read: save the sheet as csv"),
+        "zdf" => text!("files of Zivid (.zdf) are not read: save the images as png and the poses as csv"),
+        "h5" | "hdf5" => text!("files of HDF5 (.h5) are not read: save the poses as csv, npz or json"),
+        _ => return None,
+    })
+}
+
+/// What a file has in place of a series; `None` of one that is no text and no array.
+fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, Text)> {
+    let is_small = std::fs::metadata(file).is_ok_and(|found| found.len() <= LARGEST);
+    let text = || folder::text(file).ok().filter(|_| is_small);
+    let of_document = |value: Result<Value, Text>| match value {
+        Ok(value) => document(&value),
+        Err(why) => (Likely::Numbers, text!("something else than its name says: {why}", why = why)),
+    };
+    Some(match folder::ending(file).as_str() {
+        "json" | "jsonl" | "samples" => of_document(value::json(&text()?)),
+        "yaml" | "yml" => of_document(value::yaml(&text()?).map(Value::List)),
+        "xml" => {
+            let text = text()?;
+            match value::opencv_xml(&text).or_else(|| xml::document(&text)) {
+                Some(value) => document(&value),
+                None => (
+                    Likely::Neither,
+                    text!("nothing that is read as records: elements of one name with six numbers or more"),
+                ),
+            }
+        }
+        "csv" | "txt" | "tsv" | "dat" | "log" => of_text(&text()?),
+        // Programs and licences have no ending either.
+        "" => Some(of_text(&text()?)).filter(|(likely, _)| *likely != Likely::Neither)?,
+        "npz" | "npy" if is_small => document(&npz::document(&folder::bytes(file).ok()?, budget)?),
+        _ => return None,
+    })
+}
+
+fn document(value: &Value) -> (Likely, Text) {
+    match tree::fields(value).poses.len() {
+        0 => (Likely::Neither, text!("no fields that are poses")),
+        1 => (Likely::Poses, text!("one pose, and three make a series")),
+        many => (Likely::Poses, text!("{count} poses under different names, which are no series", count = many)),
+    }
+}
+
+fn of_text(text: &str) -> (Likely, Text) {
+    let widths = table::widths(text);
+    let Some((width, rows)) = widths.iter().max_by_key(|(_, rows)| **rows) else {
+        let poses = blocks::document(text).map_or(0, |value| tree::fields(&value).poses.len());
+        return if poses > 0 {
+            (Likely::Poses, text!("{count} of the poses of which three make a series", count = poses))
+        } else {
+            (Likely::Neither, text!("no rows of numbers"))
+        };
+    };
+    let why = match (*rows, width) {
+        (1, _) => text!("one row of {width} numbers, and three make a series"),
+        (2, _) => text!("two rows of {width} numbers, and three make a series"),
+        (_, 5..=8) => text!(
+            "{rows} rows of {width} numbers that are no poses: if they are joint values, name the arm with arm=NAME"
+        ),
+        _ => text!("{rows} rows of {width} numbers, of which poses are not made"),
+    };
+    (Likely::Numbers, why.with("rows", rows).with("width", width))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Settings, Sights, judge, open};
+    use handeye_geometry::progress::CancelToken;
+    use std::fs;
+
+    fn said(files: &[(&str, &str)]) -> String {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, text) in files {
+            fs::write(folder.path().join(name), text).expect("written");
+        }
+        let recording = open(folder.path()).expect("a recording");
+        judge(&recording, &Sights::default(), &Settings::default(), &CancelToken::default())
+            .expect_err("no poses")
+            .to_string()
+    }
+
+    #[test]
+    fn every_file_that_was_looked_at_is_named_with_what_it_has() {
+        let why = said(&[
+            ("corners.txt", "1 2 3\n4 5 6\n7 8 9\n1 1 1\n"),
+            ("angles.csv", "1,2,3,4,5,6,7\n2,2,3,4,5,6,7\n2,2,3,4,5,6,8\n"),
+            ("pose.json", r#"{"position": [1, 2, 3], "orientation": [0, 0, 0, 1]}"#),
+            ("broken.yaml", "a: [1, 2\nb: }"),
+            ("Notes.txt", "we took twenty images\n"),
+            ("LICENSE", "all rights\n"),
+            ("CMakeLists.txt", "project(x)\n"),
+        ]);
+        assert!(!why.contains("LICENSE"), "{why}");
+        assert_eq!(why.matches(" has ").count(), 5, "{why}");
+        for part in [
+            "corners.txt has 4 rows of 3 numbers",
+            "angles.csv has 3 rows of 7 numbers that are no poses: if they are joint values, name the arm",
+            "pose.json has one pose, and three make a series",
+            "broken.yaml has something else than its name says",
+            "CMakeLists.txt has no rows of numbers",
+        ] {
+            assert!(why.contains(part), "{part}: {why}");
+        }
+    }
+
+    #[test]
+    fn at_most_five_are_named_and_formats_that_are_not_read_are_always() {
+        let names: Vec<String> = "abcdefg".chars().map(|c| format!("{c}.txt")).collect();
+        let mut files: Vec<(&str, &str)> = names.iter().map(|name| (name.as_str(), "nothing")).collect();
+        files.extend([("poses.mat", "x"), ("poses.pkl", "x"), ("z.xlsx", "x")]);
+        let why = said(&files);
+        assert_eq!(why.matches("no rows of numbers").count(), 5, "{why}");
+        assert!(why.contains(".mat) are not read") && why.contains(".pkl) are not read"), "{why}");
+        assert!(why.contains("csv, npz or json") && why.contains("spreadsheets"), "{why}");
+    }
+}

@@ -1,0 +1,289 @@
+//! What was found: images and series of poses, as the files have them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix4};
+use tempfile::TempDir;
+
+use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use handeye_estimate::clock_offset::ClockOffset;
+use handeye_estimate::handeye::Mode;
+use handeye_files::bounds::Bounds;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::targets::TargetSpec;
+use handeye_wording::Text;
+use handeye_wording::text;
+
+/// A recording as it was found. Nothing of it is interpreted yet: numbers stand as they were written.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    /// The folder.
+    pub root: PathBuf,
+    /// What its files may name, and whoever chooses what they mean.
+    pub bounds: Bounds,
+    /// What is there and why it is taken for that, one sentence each.
+    pub beliefs: Vec<String>,
+    /// Streams of images: of one naming and one size in one folder, in natural order.
+    pub streams: Vec<Stream>,
+    /// Series of poses.
+    pub tracks: Vec<Track>,
+    /// Series of which all poses are the same: settings, or a robot that did not move.
+    pub still: Vec<Track>,
+    /// Joint values, of which the chain of the arm makes poses.
+    pub joints: Vec<JointSeries>,
+    /// Rows of numbers without names. They are joint values only for whoever names the arm.
+    pub rows: Vec<JointSeries>,
+    /// Poses of a robot that moves, as densely as they were recorded: what images of a stream with stamps are given poses of
+    /// ([`timed`](super::timed)).
+    pub motions: Vec<Motion>,
+    /// Poses where a moving robot stood, too few to be taken where the motion tells more: what is left where its clock cannot be
+    /// related to that of the images.
+    pub at_rest: Vec<Track>,
+    /// How far clocks are apart, where poses were given to images by their stamps.
+    pub clocks: Vec<Clocks>,
+    /// Cameras that files describe.
+    pub cameras: Vec<FoundCamera>,
+    /// Targets that files describe.
+    pub targets: Vec<FoundTarget>,
+    /// Where the camera sits, when a file says so, and which one.
+    pub mode: Option<FoundMode>,
+    /// Where no series was found, what the files have instead, one sentence each.
+    pub nothing: Vec<Text>,
+    /// What a person should know of the files: doubled ones, some that cannot be read.
+    pub warnings: Vec<Text>,
+    /// Where images lie that were unpacked; they go with the recording.
+    pub scratch: Vec<Arc<TempDir>>,
+}
+
+impl Recording {
+    /// Whether the images of a stream, by its place, are photographs. Those of 16 bits of grey are depths where there are others.
+    pub fn has_photographs(&self, stream: usize) -> bool {
+        let is_depth = |stream: &Stream| stream.is_depth && stream.points.is_none();
+        self.streams.get(stream).is_some_and(|it| it.points.is_none())
+            && (!is_depth(&self.streams[stream]) || self.streams.iter().all(is_depth))
+    }
+
+    /// The files of the images of a stream, by its place in [`streams`](Self::streams).
+    pub fn image_paths(&self, stream: usize) -> Vec<PathBuf> {
+        self.streams[stream].images.iter().map(|image| self.root.join(&image.path)).collect()
+    }
+}
+
+/// Images of one naming in one folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stream {
+    /// As `--set images=` names it.
+    pub name: String,
+    /// In natural order.
+    pub images: Vec<ImageFile>,
+    /// Width and height in pixels of all of them.
+    pub size: (u32, u32),
+    /// One channel of 16 bits: depth, where there are other images.
+    pub is_depth: bool,
+    /// In the place of images, points of the target that another program has found in each, in the order of the file; the size is
+    /// (0, 0) where no file says it. `images` are then the files or entries that they are from.
+    pub points: Option<Vec<Option<Vec<[f64; 2]>>>>,
+}
+
+/// An image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImageFile {
+    /// Where it is, below the folder of the recording; of one that was unpacked as a whole.
+    pub path: PathBuf,
+    /// The number in its name that differs from image to image.
+    pub number: Option<u64>,
+    /// An earlier image of the stream with the same bytes, by its index.
+    pub same_as: Option<usize>,
+    /// When it was taken by the camera's clock, nanoseconds; of images of a moving robot.
+    pub stamp_ns: Option<i64>,
+}
+
+impl ImageFile {
+    /// Its path as text.
+    pub fn shown(&self) -> String {
+        self.path.display().to_string()
+    }
+}
+
+/// What the poses of a series are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Of the robot, by its name or because there is nothing else.
+    Robot,
+    /// Of the target as seen by the camera.
+    Target,
+    /// Either.
+    Unknown,
+}
+
+/// A series of poses.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// As `--set poses=` names it.
+    pub name: String,
+    /// What they are of.
+    pub role: Role,
+    /// What the file says of its conventions.
+    pub stated: Stated,
+    /// The series of which it is another reading: the same numbers in another order.
+    pub reading_of: Option<String>,
+    /// In the order of the file, or of the files' numbers.
+    pub samples: Vec<Sample>,
+}
+
+impl Track {
+    /// Whether all its poses are the same numbers: a setting, or a robot that did not move.
+    pub fn is_still(&self) -> bool {
+        self.samples.windows(2).all(|pair| pair[0].numbers == pair[1].numbers)
+    }
+}
+
+/// One pose as it was written.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// The image that it names.
+    pub image: Option<String>,
+    /// Its number in the file, or the number of its file.
+    pub number: Option<u64>,
+    /// Where it stands, for messages: file and row. A row that may be read in several ways has one for all of them.
+    pub place: Arc<Text>,
+    /// The numbers.
+    pub numbers: Numbers,
+    /// Joint values that stand with it, in the unit of the file.
+    pub joints: Vec<f64>,
+}
+
+/// A series of joint values.
+#[derive(Debug, Clone)]
+pub struct JointSeries {
+    /// As it is told of.
+    pub name: String,
+    /// Names of the joints in the order of the values, where they are said.
+    pub joints: Vec<String>,
+    /// Of the values of revolute joints, where it is said.
+    pub unit: Option<Known<AngleUnit>>,
+    /// In the order of the file.
+    pub samples: Vec<JointSample>,
+}
+
+/// Poses of a robot that moves.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// As `--set poses=` names the series that is made of it.
+    pub name: String,
+    /// What they are of.
+    pub role: Role,
+    /// Which way they map, where it is known.
+    pub direction: Option<Known<Direction>>,
+    /// By the robot's clock in nanoseconds, rising; metres.
+    pub poses: Arc<Vec<(i64, Isometry3<f64>)>>,
+}
+
+/// How far the clock of a camera and that of a robot are apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clocks {
+    /// The images.
+    pub images: String,
+    /// The robot's poses.
+    pub poses: String,
+    /// What is added to stamps of the images to have them by the robot's clock.
+    pub offset: ClockOffset,
+    /// Images that say so.
+    pub count: usize,
+}
+
+/// The joint values of one pose.
+#[derive(Debug, Clone)]
+pub struct JointSample {
+    /// The image that they name.
+    pub image: Option<String>,
+    /// Their number in the file, or the number of their file.
+    pub number: Option<u64>,
+    /// Where they stand, for messages.
+    pub place: Arc<Text>,
+    /// The values.
+    pub values: Vec<f64>,
+}
+
+/// The numbers of a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Numbers {
+    /// x y z and three numbers of a rotation.
+    Angles([f64; 6]),
+    /// x y z and a quaternion of unit length.
+    Quaternion([f64; 7]),
+    /// A rigid transform.
+    Matrix(Matrix4<f64>),
+}
+
+/// What a file says of the conventions of a series, and how it is known. `None`: not stated.
+#[derive(Debug, Clone, Default)]
+pub struct Stated {
+    /// Of lengths.
+    pub length: Option<Known<LengthUnit>>,
+    /// Of angles.
+    pub angle: Option<Known<AngleUnit>>,
+    /// Of rotations: the ones that are left open by what is known.
+    pub rotation: Option<Known<Vec<RotationForm>>>,
+    /// Which way it maps.
+    pub direction: Option<Known<Direction>>,
+    /// Of the direction with the place of the camera, where one follows from the other.
+    pub direction_in: Option<Known<[(Mode, Direction); 2]>>,
+}
+
+/// A fact and why it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known<T> {
+    /// The fact.
+    pub value: T,
+    /// Who says so.
+    pub why: String,
+}
+
+impl<T> Known<T> {
+    /// By whom.
+    pub fn by(why: impl Into<String>, value: T) -> Self {
+        Self { value, why: why.into() }
+    }
+}
+
+/// Where the camera sits, as a file says it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundMode {
+    /// It.
+    pub value: Mode,
+    /// By what the file says it.
+    pub key: &'static str,
+    /// The file.
+    pub file: String,
+}
+
+impl FoundMode {
+    /// Who says so.
+    pub fn why(&self) -> Text {
+        text!("{key} in {file}", key = self.key, file = &self.file)
+    }
+}
+
+/// A target that a file describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundTarget {
+    /// It.
+    pub target: TargetSpec,
+    /// The file.
+    pub file: String,
+    /// It is a tag and the file does not say which of its family: the images have to.
+    pub is_id_open: bool,
+}
+
+/// A camera that a file describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundCamera {
+    /// The file, as `--set camera=` names it.
+    pub name: String,
+    /// It. Width and height are 0 where the file does not say them.
+    pub intrinsics: Intrinsics,
+    /// What kind of file it is.
+    pub why: &'static str,
+}

@@ -1,0 +1,257 @@
+//! Poses of a moving robot at the times of images: how far the clocks of the two are apart is estimated from what both saw of
+//! the motion, and refused where that does not tell.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+
+use super::conventions::{Direction, LengthUnit, RotationForm};
+use super::error::ImportError;
+use super::formats::tree;
+use super::judge::{Sights, TIMES};
+use super::recording::{Clocks, ImageFile, Known, Motion, Numbers, Recording, Role, Sample, Stated, Stream, Track};
+use super::settings::Settings;
+use super::sight::Sight;
+use handeye_estimate::clock_offset::{ClockOffset, ClockOffsetError, clock_offset, pose_at};
+use handeye_estimate::diagnose::doctor::agreement::agreement;
+use handeye_estimate::handeye::{Mode, PosePair, subset};
+use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use handeye_geometry::progress::CancelToken;
+use handeye_wording::text;
+
+/// Clocks of one bag that are set by the network are apart by less.
+const WITHIN_S: f64 = 2.0;
+/// Views that are made of images of a moving robot: more of them are of neighbouring places.
+const MOST_VIEWS: usize = 60;
+/// Pairs by which the two places of the camera are compared.
+const MOST_COMPARED: usize = 60;
+/// Half of the time over which a speed is measured.
+const SPEED_S: f64 = 0.02;
+
+/// Gives images of a moving robot their poses, and keeps of the images those in which the robot was slowest.
+///
+/// Where the offset of the clocks cannot be told, the images at which the robot stood are kept, if there are three and more.
+///
+/// `None` where no stream has stamps; `sights` are those of the recording that comes back.
+///
+/// # Errors
+/// [`ImportError::Clocks`] where the offset of the clocks cannot be told and the robot hardly stood.
+pub fn timed(
+    recording: &Recording,
+    sights: &mut Sights,
+    settings: &Settings,
+    cancel: &CancelToken,
+) -> Result<Option<Recording>, ImportError> {
+    let mut out = recording.clone();
+    let mut is_timed = false;
+    for i in 0..recording.streams.len() {
+        let stream = &recording.streams[i];
+        let Some(sight) = sights.streams.get(i).and_then(Option::as_ref) else { continue };
+        let Some(first_ns) = stream.images.iter().find_map(|image| image.stamp_ns) else { continue };
+        let seen = seen(stream, sight, first_ns);
+        let mut found = Vec::new();
+        let mut refusal = None;
+        let is_wanted = |motion: &&Motion| match &settings.poses {
+            Some(name) => *name == motion.name,
+            None => motion.role != Role::Target,
+        };
+        for motion in recording.motions.iter().filter(is_wanted) {
+            match told(motion, &seen, sight, first_ns, settings, cancel) {
+                Ok(offset) => found.push((motion, offset)),
+                Err(why) => {
+                    refusal =
+                        Some(ImportError::Clocks { images: stream.name.clone(), poses: motion.name.clone(), why });
+                }
+            }
+        }
+        let Some((motion, offset)) = found.first() else {
+            // Without a robot there is nothing to be timed by, which is said later.
+            let Some(refusal) = refusal else { continue };
+            if !stood(recording, &mut out, sights, i, &refusal) {
+                return Err(refusal);
+            }
+            is_timed = true;
+            continue;
+        };
+        is_timed = true;
+        let chosen = slowest(&seen, &anchor_from_mount(motion, Direction::Forward, first_ns), offset, sight.distance_m);
+        for (motion, offset) in &found {
+            out.tracks.extend(track(motion, stream, offset, &chosen, first_ns));
+            let (images, poses) = (stream.name.clone(), motion.name.clone());
+            out.clocks.push(Clocks { images, poses, offset: *offset, count: seen.len() });
+            out.beliefs.push(format!(
+                "{:.3} ± {:.3} ms are added to the stamps of {} images {} to have them by the clock of {}",
+                offset.offset_s * 1e3,
+                offset.sigma_s * 1e3,
+                seen.len(),
+                stream.name,
+                motion.name
+            ));
+        }
+        let kept = |index: &usize| stream.images[*index].clone();
+        out.streams[i].images = chosen.iter().map(kept).collect();
+        sights.streams[i] = Some(sight.of_images(&chosen));
+    }
+    Ok(is_timed.then_some(out))
+}
+
+/// Keeps of a stream the images at which the robot stood, with their poses; whether there are enough.
+fn stood(recording: &Recording, out: &mut Recording, sights: &mut Sights, i: usize, refusal: &ImportError) -> bool {
+    let stream = &recording.streams[i];
+    let Some(sight) = sights.streams.get(i).and_then(Option::as_ref) else { return false };
+    let name = |image: &ImageFile| image.path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let names: HashSet<String> = stream.images.iter().filter_map(name).collect();
+    let is_of_stream = |track: &&Track| {
+        let images = track.samples.iter().filter(|it| it.image.as_ref().is_some_and(|image| names.contains(image)));
+        images.count() >= tree::LEAST_POSES
+    };
+    let tracks: Vec<Track> = recording.at_rest.iter().filter(is_of_stream).cloned().collect();
+    let at_rest: HashSet<&String> =
+        tracks.iter().flat_map(|track| &track.samples).filter_map(|it| it.image.as_ref()).collect();
+    let is_at_rest = |image: &usize| name(&stream.images[*image]).is_some_and(|name| at_rest.contains(&name));
+    let kept: Vec<usize> = (0..stream.images.len()).filter(is_at_rest).collect();
+    if tracks.is_empty() || kept.iter().filter(|image| sight.seen[**image].is_some()).count() < tree::LEAST_POSES {
+        return false;
+    }
+    out.warnings.push(text!(
+        "{refusal}. Of {stream} only the {count} images at which the robot stood are used, which are few",
+        refusal = refusal,
+        stream = &stream.name,
+        count = kept.len()
+    ));
+    out.streams[i].images =
+        kept.iter().map(|image| ImageFile { stamp_ns: None, ..stream.images[*image].clone() }).collect();
+    sights.streams[i] = Some(sight.of_images(&kept));
+    out.tracks.extend(tracks);
+    true
+}
+
+/// An image in which the target was seen: its place in the stream, its time in seconds after the first image, what was seen.
+type Seen = (usize, f64, Isometry3<f64>);
+
+fn seen(stream: &Stream, sight: &Sight, first_ns: i64) -> Vec<Seen> {
+    let one = |(index, image): (usize, &ImageFile)| {
+        Some((index, seconds(image.stamp_ns?, first_ns), (*sight.seen.get(index)?)?))
+    };
+    let mut seen: Vec<Seen> = stream.images.iter().enumerate().filter_map(one).collect();
+    seen.sort_by(|a, b| a.1.total_cmp(&b.1));
+    seen.dedup_by(|a, b| a.1 == b.1);
+    seen
+}
+
+/// Stamps count from 1970, which leaves a float too few digits.
+fn seconds(stamp_ns: i64, first_ns: i64) -> f64 {
+    stamp_ns.saturating_sub(first_ns) as f64 * 1e-9
+}
+
+fn anchor_from_mount(motion: &Motion, class: Direction, first_ns: i64) -> Vec<(f64, Pose<Anchor, Mount>)> {
+    motion.poses.iter().map(|(ns, pose)| (seconds(*ns, first_ns), Pose::from_isometry(class.of(pose)))).collect()
+}
+
+/// The offset under the place of the camera and the direction of the poses that explain what was seen.
+fn told(
+    motion: &Motion,
+    seen: &[Seen],
+    sight: &Sight,
+    first_ns: i64,
+    settings: &Settings,
+    cancel: &CancelToken,
+) -> Result<ClockOffset, ClockOffsetError> {
+    let about_s = settings.clock_offset_s.unwrap_or(0.0);
+    let camera: Vec<(f64, Pose<Camera, Target>)> =
+        seen.iter().map(|(_, time_s, pose)| (time_s + about_s, Pose::from_isometry(*pose))).collect();
+    let mut told: Vec<(f64, ClockOffset)> = Vec::new();
+    let mut refusal = None;
+    for class in classes(motion, settings) {
+        let robot = anchor_from_mount(motion, class, first_ns);
+        match clock_offset(&robot, &camera, WITHIN_S, cancel) {
+            Err(why) => refusal = Some(why),
+            Ok(offset) => {
+                let pair = |(time_s, camera_from_target): &(f64, Pose<Camera, Target>)| {
+                    let anchor_from_mount = pose_at(&robot, time_s + offset.offset_s)?;
+                    Some(PosePair { anchor_from_mount, camera_from_target: *camera_from_target })
+                };
+                let pairs: Vec<PosePair> = camera.iter().filter_map(pair).collect();
+                let pairs: Vec<PosePair> =
+                    subset::spread(pairs.len(), MOST_COMPARED).into_iter().map(|i| pairs[i]).collect();
+                let left = agreement(&sight.outer, &pairs, true).map_or(f64::INFINITY, |found| found.median_m);
+                told.push((left, ClockOffset { offset_s: offset.offset_s + about_s, ..offset }));
+            }
+        }
+    }
+    told.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match (told.as_slice(), refusal) {
+        ([(_, best)], _) => Ok(*best),
+        ([(left, best), (other_left, other)], _) => {
+            let apart_s = (best.offset_s - other.offset_s).abs();
+            if TIMES * left < *other_left || apart_s <= best.sigma_s.max(other.sigma_s) {
+                Ok(*best)
+            } else {
+                Err(ClockOffsetError::Ambiguous { first_s: best.offset_s, second_s: other.offset_s })
+            }
+        }
+        (_, Some(why)) => Err(why),
+        _ => Err(ClockOffsetError::Apart { within_s: WITHIN_S }),
+    }
+}
+
+/// The inverse of what was recorded is what the mount does where the camera stands beside the robot.
+fn classes(motion: &Motion, settings: &Settings) -> Vec<Direction> {
+    let direction = settings.direction.or(motion.direction.as_ref().map(|known| known.value));
+    let other = |direction: Direction| Direction::ALL.into_iter().filter(move |d| *d != direction);
+    match (settings.mode, direction) {
+        (Some(Mode::EyeInHand), Some(direction)) => vec![direction],
+        (Some(Mode::EyeToHand), Some(direction)) => other(direction).collect(),
+        _ => Direction::ALL.to_vec(),
+    }
+}
+
+/// Of every part of the recording the image in which the robot was slowest: the least blurred, and the one that an error of
+/// the clocks matters least to.
+fn slowest(seen: &[Seen], robot: &[(f64, Pose<Anchor, Mount>)], offset: &ClockOffset, distance_m: f64) -> Vec<usize> {
+    let speed = |(index, time_s, _): &Seen| -> Option<(f64, usize)> {
+        let at = |by_s: f64| pose_at(robot, time_s + offset.offset_s + by_s);
+        let (before, after) = (at(-SPEED_S)?, at(SPEED_S)?);
+        let (metres, radians) = before.distance_to(&after);
+        Some((metres + radians * distance_m, *index))
+    };
+    let usable: Vec<(f64, usize)> = seen.iter().filter_map(speed).collect();
+    let of_part = |part: &[(f64, usize)]| part.iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, index)| *index);
+    usable.chunks(usable.len().div_ceil(MOST_VIEWS).max(1)).filter_map(of_part).collect()
+}
+
+fn track(motion: &Motion, stream: &Stream, offset: &ClockOffset, chosen: &[usize], first_ns: i64) -> Option<Track> {
+    let robot = anchor_from_mount(motion, Direction::Forward, first_ns);
+    let sample = |index: &usize| {
+        let image = &stream.images[*index];
+        let time_s = seconds(image.stamp_ns?, first_ns) + offset.offset_s;
+        let pose = *pose_at(&robot, time_s)?.isometry();
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        Some(Sample {
+            image: Some(image.shown()),
+            number: None,
+            place: Arc::new(text!(
+                "{name} at {seconds} s",
+                name = &motion.name,
+                seconds = format!("{:.4}", first_ns as f64 * 1e-9 + time_s)
+            )),
+            numbers: Numbers::Quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w]),
+            joints: Vec::new(),
+        })
+    };
+    let stated = Stated {
+        length: Some(Known::by("ROS has metres", LengthUnit::Metre)),
+        rotation: Some(Known::by("ROS has x y z w", vec![RotationForm::Xyzw])),
+        direction: motion.direction.clone(),
+        ..Stated::default()
+    };
+    let samples = chosen.iter().filter_map(sample).collect();
+    let mut track = tree::track(motion.name.clone(), "robot", stated, samples).filter(|track| !track.is_still())?;
+    track.role = motion.role;
+    Some(track)
+}
+
+#[cfg(test)]
+#[path = "timing_tests.rs"]
+mod tests;

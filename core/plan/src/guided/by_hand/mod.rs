@@ -1,0 +1,234 @@
+//! The same plan for a robot that is not driven by this program: hand-guided, by its pendant, or in a cell that cannot move
+//! it. Views are proposed as they look in the image, and a person brings them about.
+//!
+//! # How
+//! [`HandGuide`] proposes a view ([`Wanted`]); before there is an answer those of [`first_views`], from then on the one that
+//! lowers the expected error most ([`Guide`]). [`Wanted::judge`] compares the view that there is with it: what to change
+//! ([`Deviation`]), and whether it is good enough, which is also the case where it differs but says nearly as much.
+//!
+//! # Degenerate cases
+//! Whether the robot can get there is not known: a person skips what cannot be reached. The robot has to say where it is; a
+//! session without robot poses has no hand-eye calibration.
+
+mod deviation;
+pub mod first_views;
+
+pub use deviation::Deviation;
+
+use super::design::Design;
+use super::{Ending, Guide, GuidedOptions, Known, LEAST_NOISE, Next, Why, at_least, used_views};
+use handeye_estimate::handeye::joint::ViewModel;
+use handeye_estimate::uncertainty::quality::TipBox;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::planar_pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+use handeye_geometry::targets::observation::Corner;
+
+/// Part of the gain of the view that is wanted with which another view is as good.
+const WORTH: f64 = 0.8;
+
+/// A first view that is turned by less against the one that there is says little: twice what a hand is off by.
+const LEAST_FIRST_TURN_RAD: f64 = 16.0 * std::f64::consts::PI / 180.0;
+
+/// Proposes the views of one calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HandGuide {
+    guide: Guide,
+    first_views: usize,
+    /// Whether what was proposed last is one of the first views, of which the guide knows nothing.
+    is_first: bool,
+}
+
+/// What comes next.
+#[derive(Debug, Clone)]
+pub enum HandNext {
+    /// A view to bring about.
+    Take(Box<Wanted>),
+    /// Nothing.
+    End(Ending),
+}
+
+/// A view that is wanted.
+#[derive(Debug, Clone)]
+pub struct Wanted {
+    /// How the board looks there.
+    pub camera_from_target: Pose<Camera, Target>,
+    /// Why; `None` for a first view and for a check.
+    pub why: Option<Why>,
+    /// Views that are expected to lead to the goal, this one first; `None` where nobody knows.
+    pub views_left: Option<usize>,
+    intrinsics: Intrinsics,
+    target: TargetSpec,
+    worth: Option<Worth>,
+}
+
+/// What a view would add, by what is known so far.
+#[derive(Debug, Clone)]
+struct Worth {
+    model: ViewModel,
+    design: Design,
+    /// Error with the view that is wanted over that without it.
+    ratio: f64,
+}
+
+/// How the view that there is compares with the one that is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// Where the board is, by the lens of the view that is wanted; `None` for corners that no pose explains.
+    pub present: Option<Pose<Camera, Target>>,
+    /// What differs; `None` where the board is not before the camera.
+    pub deviation: Option<Deviation>,
+    /// Whether a capture here is as good, with the whole board in the image.
+    pub is_good: bool,
+}
+
+impl HandGuide {
+    /// Nothing is captured yet.
+    pub fn new(options: GuidedOptions) -> Self {
+        Self { guide: Guide::new(options), first_views: 0, is_first: false }
+    }
+
+    /// Every view that was proposed from an answer, and what came of it.
+    pub fn guide(&self) -> &Guide {
+        &self.guide
+    }
+
+    /// See [`Guide::work_in`].
+    pub fn work_in(&mut self, tool_box: Option<TipBox>) {
+        self.guide.work_in(tool_box);
+    }
+
+    /// There is a view of what was proposed last.
+    pub fn captured(&mut self) {
+        if !self.is_first {
+            self.guide.captured();
+        }
+    }
+
+    /// A person leaves out what was proposed last.
+    pub fn skipped(&mut self) {
+        if !self.is_first {
+            self.guide.skipped();
+        }
+    }
+
+    /// What to do next; `first` is how the board was seen at the first view, with the lens that is known or assumed.
+    /// [`Known::robot`] is not looked at. Long work polls `cancel`; cancelled it returns an end, which means nothing.
+    pub fn next(
+        &mut self,
+        known: &Known<'_>,
+        first: &Pose<Camera, Target>,
+        intrinsics: &Intrinsics,
+        cancel: &CancelToken,
+    ) -> HandNext {
+        let known = Known { robot: None, ..*known };
+        let target = &known.observations.target;
+        self.is_first = false;
+        match self.guide.next(&known, cancel) {
+            Next::End(ending) => HandNext::End(ending),
+            Next::Go { plan, why: why @ Why::Gain { .. } } => {
+                let Some(proposal) = plan.proposals.first() else {
+                    return HandNext::End(Ending::NothingInReach { candidates: plan.candidates });
+                };
+                let worth = self.worth(&known, proposal.error_ratio, cancel);
+                let intrinsics = worth.as_ref().map_or(*intrinsics, |worth| *worth.model.intrinsics());
+                HandNext::Take(Box::new(Wanted {
+                    camera_from_target: proposal.camera_from_target,
+                    why: Some(why),
+                    views_left: self.guide.views_left(&known, &plan),
+                    intrinsics,
+                    target: *target,
+                    worth,
+                }))
+            }
+            Next::Go { why: Why::FirstTurns { .. } | Why::FirstTilts { .. }, .. } => {
+                // A turn of the tip says nothing to somebody who looks at the image, and is nowhere to be avoided.
+                self.guide.steps.pop();
+                self.is_first = true;
+                while self.first_views < super::MOST_FAN {
+                    self.first_views += 1;
+                    let view = first_views::view(intrinsics, target, first, self.first_views - 1)
+                        .filter(|view| view.rotation().angle_to(&first.rotation()) > LEAST_FIRST_TURN_RAD);
+                    if let Some(camera_from_target) = view {
+                        let (intrinsics, target) = (*intrinsics, *target);
+                        let (why, views_left, worth) = (None, None, None);
+                        return HandNext::Take(Box::new(Wanted {
+                            camera_from_target,
+                            why,
+                            views_left,
+                            intrinsics,
+                            target,
+                            worth,
+                        }));
+                    }
+                }
+                HandNext::End(Ending::NoStart)
+            }
+        }
+    }
+
+    /// A view that was not designed, to check the answer at, see [`Guide::check_pose`]; `None` where there is no answer.
+    pub fn check(&self, known: &Known<'_>, index: usize, skips: usize, cancel: &CancelToken) -> Option<Wanted> {
+        let known = Known { robot: None, ..*known };
+        let proposal = self.guide.check_pose(&known, index, skips, cancel)?;
+        Some(Wanted {
+            camera_from_target: proposal.camera_from_target,
+            why: None,
+            views_left: None,
+            intrinsics: known.calibration?.intrinsics()?,
+            target: known.observations.target,
+            worth: None,
+        })
+    }
+
+    fn worth(&self, known: &Known<'_>, ratio: f64, cancel: &CancelToken) -> Option<Worth> {
+        let model = ViewModel::new(known.calibration?, &known.observations.target)?;
+        let noise = at_least(model.noise(), &LEAST_NOISE);
+        let model = model.with_noise(noise);
+        let used = used_views(known.observations, known.fit());
+        let design = self.guide.ground(known, &model, &used, cancel)?.design;
+        Some(Worth { model, design, ratio })
+    }
+}
+
+impl Wanted {
+    /// The lens by which it is to be drawn.
+    pub fn intrinsics(&self) -> &Intrinsics {
+        &self.intrinsics
+    }
+
+    /// Compares with the view that there is, by the corners found in it and where the robot says that it is. A tenth of a
+    /// millisecond in a release build (`guided_capture -- speed`), so it may be asked for every image.
+    pub fn judge(&self, corners: &[Corner], base_from_tip: &Pose<Base, Tip>) -> Judged {
+        // By the lens that the wanted view is drawn by: one that is wrong yet looks right is the same view.
+        let present = planar_pose::camera_from_target(corners, &self.target, &self.intrinsics).ok();
+        let deviation = present
+            .and_then(|present| Deviation::between(&self.intrinsics, &self.target, &present, &self.camera_from_target));
+        let is_near = deviation.is_some_and(|deviation| deviation.is_near());
+        // One that is wanted at the edge of the image may be near and cut off.
+        let is_whole = corners.len() == self.target.len();
+        Judged { present, deviation, is_good: is_whole && (is_near || self.says_as_much(base_from_tip)) }
+    }
+
+    /// Whether a view from there lowers the error by nearly as much.
+    fn says_as_much(&self, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let Some(Worth { model, design, ratio }) = &self.worth else { return false };
+        let all: Vec<usize> = (0..self.target.len()).collect();
+        let Some(view) = model.expected(base_from_tip, &all) else { return false };
+        let there = design.error_with_m(&view) / design.error_m();
+        // Gains add up as logarithms.
+        *ratio < 1.0 && there.ln() <= WORTH * ratio.ln()
+    }
+}
+
+/// By the view alone: what it is judged by follows from it.
+impl PartialEq for Wanted {
+    fn eq(&self, other: &Self) -> bool {
+        self.camera_from_target == other.camera_from_target && self.why == other.why
+    }
+}
+
+#[cfg(test)]
+mod tests;

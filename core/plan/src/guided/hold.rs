@@ -1,0 +1,68 @@
+//! Why a guided session goes on although its expected error is below the goal.
+
+use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS, error_at_upper_levels, worst};
+use handeye_wording::Text;
+use handeye_wording::text;
+
+/// What is missing although the expected error is below the goal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Hold {
+    /// Fewer than [`LEAST_VIEWS`] views.
+    FewViews,
+    /// What was found speaks against the answer.
+    Doubted,
+    /// The upper 80 % limit of the noise levels gives an error above the goal, metres.
+    NoiseLevels {
+        /// The error at that limit.
+        error_m: f64,
+    },
+    /// It was below the goal once, and has to be twice in a row.
+    Confirmation,
+}
+
+impl Hold {
+    /// For people.
+    pub fn text(&self) -> Text {
+        match self {
+            Self::FewViews => text!(
+                "Below the goal, and goes on to {views} poses: errors of the robot that depend on the pose cannot be seen in fewer",
+                views = LEAST_VIEWS
+            ),
+            Self::Doubted => {
+                text!("Below the goal, and goes on: what was found speaks against the answer, see the findings")
+            }
+            Self::NoiseLevels { error_m } => text!(
+                "Below the goal, and goes on: the noise is known from few poses only and may be larger; then the error would be \
+                 {error} mm",
+                error = format!("{:.3}", error_m * 1e3)
+            ),
+            Self::Confirmation => {
+                text!("Below the goal, and goes on: {times} answers in a row have to be below it", times = IN_A_ROW)
+            }
+        }
+    }
+}
+
+impl Guide {
+    /// Why it goes on below the goal, as of the last [`Guide::next`]; `None` where the expected error is not below it.
+    pub fn hold(&self) -> Option<Hold> {
+        self.hold
+    }
+
+    /// The same of an answer with so many views.
+    pub(super) fn hold_of(&self, known: &Known<'_>, views: usize) -> Option<Hold> {
+        let (calibration, goal_m, tool_box) = (known.calibration?, self.options.goal_m, self.options.tool_box.as_ref());
+        let stated_m = worst(calibration, tool_box, |point| calibration.error_95_m(point))?;
+        if stated_m > goal_m {
+            return None;
+        }
+        if views < LEAST_VIEWS {
+            return Some(Hold::FewViews);
+        }
+        if !self.is_sound(known.calibration) {
+            return Some(Hold::Doubted);
+        }
+        let error_m = error_at_upper_levels(calibration, tool_box)?;
+        Some(if error_m > goal_m { Hold::NoiseLevels { error_m } } else { Hold::Confirmation })
+    }
+}

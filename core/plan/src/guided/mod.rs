@@ -1,0 +1,647 @@
+//! Calibration that chooses its own poses: from one view of the board to the accuracy that was asked for.
+//!
+//! # How
+//! Before there is a first estimate the tip is turned a little about its own axes ([`fan`]). From then on every view is the
+//! one of many possible ones that lowers the expected error of the tip over a box most for its travel ([`choose`]),
+//! by the same information matrix as the estimate ([`ViewModel`]). A view is possible where the whole board is in the image
+//! in spite of what is not known yet, so moves are small at first and grow with what is known.
+//!
+//! # When it ends
+//! See [`Ending`]. The error is that of the calibration, at the upper 80 % limit of its noise levels: an end that waits for
+//! a small estimate prefers estimates that happen to be small.
+//!
+//! # Degenerate cases
+//! A session whose views determine nothing goes on with the fan. Joint offsets of the robot, where they are estimated, are
+//! not among what a view is expected to tell.
+
+pub mod by_hand;
+pub mod candidates;
+pub mod choose;
+pub mod design;
+pub mod fan;
+mod hold;
+pub mod outlook;
+mod start;
+mod words;
+
+pub use hold::Hold;
+
+use nalgebra::Point3;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use crate::Contact;
+use candidates::ViewRange;
+use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot, with_board};
+use design::Design;
+use handeye_arm::JointValues;
+use handeye_estimate::claim::Claim;
+use handeye_estimate::diagnose::Calibration;
+use handeye_estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, ViewModel};
+use handeye_estimate::uncertainty::quality::TipBox;
+use handeye_estimate::{Fit, Observations, ViewStatus};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::point_error;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::TargetSpec;
+
+/// Views from which on an end is possible: from as many on errors of the robot that depend on where it stands are looked for,
+/// and with fewer the noise levels are hardly known.
+pub const LEAST_VIEWS: usize = FIELD_VIEWS;
+/// Gain of the best view \[part of the error\] below which more views are not worth their time.
+pub const LEAST_GAIN: f64 = 0.03;
+/// Captures that check the answer afterwards, where nobody says how many.
+pub const CHECKS: usize = 3;
+/// Part of the goal by which explanations that the answer does not count on may move it.
+const SMALL_PART: f64 = 0.1;
+/// Solves in a row in which the error has to be below the goal.
+const IN_A_ROW: usize = 2;
+/// Probability that the noise levels are below what the end is judged by.
+const LEVEL_SURE: f64 = 0.8;
+/// How far the tip turns from the nearest view so far, per view there is: a first estimate from small turns is not trusted
+/// with large ones. From six views on there is no limit.
+const TURN_PER_VIEW_RAD: f64 = 40.0 * std::f64::consts::PI / 180.0;
+/// Views with a limit of that.
+const CAREFUL_VIEWS: usize = 6;
+/// Part of that which is left after each pose that somebody leaves out.
+const NEARER_PER_SKIP: f64 = 0.7;
+/// And what is left of it at the end: less is hardly another view.
+const LEAST_TURN_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
+/// Further free space around the board, metres, while there are fewer views than that: it is not where it is taken to be.
+const CAREFUL_ROOM_M: f64 = 0.03;
+/// Largest way of a joint to a pose of the fan, radians: more is another configuration, not a small turn.
+const LARGEST_FAN_WAY_RAD: f64 = 0.8;
+/// Poses in a row without a view after which it ends.
+const MOST_FAILURES: usize = 5;
+/// Poses of the fan that are tried before it is given up.
+const MOST_FAN: usize = 24;
+/// Views at random among which a check finds one that the arm gets to.
+const CHECK_CANDIDATES: usize = 200;
+/// Noise levels below which a plan does not reckon: far below those of any robot and any camera.
+const LEAST_NOISE: Noise = Noise { corner_px: 2e-3, robot_m: 2e-6, robot_rad: 5e-6, ..Noise::EXACT };
+/// The same while there are few views: what they say of the levels may be nothing.
+const CAREFUL_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuidedOptions {
+    /// The 95 % error that is to be reached, metres.
+    pub goal_m: f64,
+    /// Views at the most.
+    pub most_views: usize,
+    /// Time at the most, seconds.
+    pub most_s: f64,
+    /// Gain of the best view, part of the error, below which it ends: see [`LEAST_GAIN`].
+    pub least_gain: f64,
+    /// Views that are compared at every step.
+    pub candidates: usize,
+    /// Views that are planned ahead.
+    pub ahead: usize,
+    /// What a capture takes after the arm has arrived, seconds.
+    pub dwell_s: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Where the tool works: the goal holds for the worst point of it, and views are chosen by the mean square over it. Where the
+    /// camera saw the board, and over a cube as large as the board about that, without one.
+    pub tool_box: Option<TipBox>,
+}
+
+impl Default for GuidedOptions {
+    fn default() -> Self {
+        Self {
+            goal_m: 3e-4,
+            most_views: 40,
+            most_s: f64::INFINITY,
+            least_gain: LEAST_GAIN,
+            candidates: 1000,
+            ahead: 6,
+            dwell_s: 1.5,
+            seed: 1,
+            tool_box: None,
+        }
+    }
+}
+
+/// What is known when the next pose is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Known<'a> {
+    /// All views so far.
+    pub observations: &'a Observations,
+    /// What they give; `None` while they do not determine an answer.
+    pub calibration: Option<&'a Calibration>,
+    /// The arm; `None` where its chain is not known.
+    pub robot: Option<&'a Robot>,
+    /// Since the beginning, seconds.
+    pub elapsed_s: f64,
+}
+
+impl<'a> Known<'a> {
+    fn fit(&self) -> Option<&'a Fit> {
+        self.calibration.map(|calibration| &**calibration)
+    }
+}
+
+/// What comes next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Next {
+    /// The first of these views, and then ask again.
+    Go {
+        /// The views that are planned.
+        plan: Plan,
+        /// Why the first.
+        why: Why,
+    },
+    /// Nothing.
+    End(Ending),
+}
+
+/// Why a pose is proposed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Why {
+    /// A small turn about an axis of the tip, because nothing is known of where the camera sits. Radians.
+    FirstTurns {
+        /// The turn.
+        turn_rad: f64,
+    },
+    /// A tilt of the camera about the board by a rough answer, because the small turns determine none. Radians.
+    FirstTilts {
+        /// The tilt, from the first view.
+        turn_rad: f64,
+    },
+    /// What it lowers the error from and to, metres, and how much of that is rotation of the camera.
+    Gain {
+        /// The 95 % error now, by the noise alone.
+        from_m: f64,
+        /// The same with it.
+        to_m: f64,
+        /// See [`Proposal::rotation_part`].
+        rotation_part: f64,
+    },
+}
+
+/// Why it ends.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ending {
+    /// The error is below the goal. Metres.
+    GoalReached {
+        /// The error that is stated.
+        error_m: f64,
+    },
+    /// The best view would lower the error by less than [`GuidedOptions::least_gain`].
+    LittleToGain {
+        /// By what part of it.
+        gain: f64,
+    },
+    /// As many views as allowed.
+    MostViews,
+    /// As much time as allowed.
+    MostTime,
+    /// The arm touches something where it stands, as far as is known: it cannot be driven away safely.
+    StartBlocked {
+        /// What it is too near to.
+        by: Contact,
+    },
+    /// The board was not seen from any of the first turns, or they determine nothing.
+    NoStart,
+    /// So many poses in a row gave no view of the board.
+    BoardLost {
+        /// How many.
+        poses: usize,
+    },
+    /// There was an answer, and there is none now.
+    AnswerLost,
+    /// The best view would gain little, and what was found speaks against the answer.
+    Doubted,
+    /// No view that would tell something can be reached.
+    NothingInReach {
+        /// Views that were compared.
+        candidates: usize,
+    },
+}
+
+/// A pose that was proposed, and what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Where the tip was to go.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The joint values there; `None` for an arm whose chain is not known.
+    pub joints: Option<JointValues>,
+    /// Why.
+    pub why: Why,
+    /// The 95 % error after it by the noise alone, metres; `None` until there is one.
+    pub achieved_m: Option<f64>,
+    /// How long the arm was to be on its way, seconds.
+    pub travel_s: f64,
+    /// Views that were compared.
+    pub candidates: usize,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// What came of a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Not known yet.
+    Pending,
+    /// A view.
+    Captured,
+    /// No view: no board, blurred, not reached.
+    Failed,
+    /// Somebody left it out.
+    Skipped,
+}
+
+impl Step {
+    /// The gain that was achieved over the one promised, both as ratios of the error after and before it.
+    pub fn achieved_over_promised(&self) -> Option<f64> {
+        let (_, to_m) = self.why.errors_m()?;
+        Some(self.achieved_m? / to_m)
+    }
+}
+
+/// Chooses the poses of one calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guide {
+    options: GuidedOptions,
+    failed: Vec<Pose<Base, Tip>>,
+    fan_tried: usize,
+    tilts_tried: usize,
+    below: usize,
+    solved_views: usize,
+    /// Where the board was when the first choice was made: what a person chose, not the guide.
+    range: Option<ViewRange>,
+    failures: usize,
+    /// Views that somebody left out, one less for each that was taken.
+    skips: usize,
+    steps: Vec<Step>,
+    hold: Option<Hold>,
+    ended: Option<Ending>,
+}
+
+impl Guide {
+    /// Nothing is captured yet.
+    pub fn new(options: GuidedOptions) -> Self {
+        Self {
+            options,
+            failed: Vec::new(),
+            fan_tried: 0,
+            tilts_tried: 0,
+            below: 0,
+            solved_views: 0,
+            range: None,
+            failures: 0,
+            skips: 0,
+            steps: Vec::new(),
+            hold: None,
+            ended: None,
+        }
+    }
+
+    /// What is asked for.
+    pub fn options(&self) -> &GuidedOptions {
+        &self.options
+    }
+
+    /// Where the tool works from now on, see [`GuidedOptions::tool_box`]: what stays in its place in the base is elsewhere in the
+    /// camera with every answer.
+    pub fn work_in(&mut self, tool_box: Option<TipBox>) {
+        self.options.tool_box = tool_box;
+    }
+
+    /// Every pose that was proposed, and what came of it.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Why it ended; `None` while it goes on.
+    pub fn ended(&self) -> Option<&Ending> {
+        self.ended.as_ref()
+    }
+
+    /// The pose proposed last gave no view: it is not proposed again, nor its neighbourhood.
+    pub fn failed(&mut self) {
+        if let Some(step) = self.steps.last_mut() {
+            step.outcome = Outcome::Failed;
+            self.failed.push(step.base_from_tip);
+        }
+        self.failures += 1;
+    }
+
+    /// Somebody leaves out the pose proposed last: it is not proposed again, nor its neighbourhood, and says nothing of
+    /// whether the board is lost. The next ones are nearer to where the arm has been.
+    pub fn skipped(&mut self) {
+        self.skips += 1;
+        if let Some(step) = self.steps.last_mut() {
+            step.outcome = Outcome::Skipped;
+            self.failed.push(step.base_from_tip);
+        }
+    }
+
+    /// The pose proposed last gave a view.
+    pub fn captured(&mut self) {
+        if let Some(step) = self.steps.last_mut() {
+            step.outcome = Outcome::Captured;
+        }
+        self.failures = 0;
+        // What kept a person from the others is still there.
+        self.skips = self.skips.saturating_sub(1);
+    }
+
+    /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
+    pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
+        let used = used_views(known.observations, known.fit());
+        if let Some(step) = self.steps.last_mut().filter(|step| step.outcome == Outcome::Captured) {
+            let modelled_m = |calibration| modelled_error_m(calibration, self.options.tool_box.as_ref());
+            step.achieved_m = known.calibration.and_then(modelled_m);
+            let last = known.observations.views.len().wrapping_sub(1);
+            if known.calibration.is_some_and(|it| it.views.get(last).is_some_and(|v| v.status == ViewStatus::Outlier)) {
+                // It says nothing, and would be proposed again.
+                self.failed.push(step.base_from_tip);
+            }
+        }
+        self.hold = self.hold_of(known, used.len());
+        let next = self.found(known, &used, cancel);
+        if cancel.is_cancelled() {
+            return next;
+        }
+        match &next {
+            Next::End(ending) => self.ended = Some(ending.clone()),
+            Next::Go { plan, why } => self.steps.extend(plan.proposals.first().map(|first| Step {
+                base_from_tip: first.base_from_tip,
+                joints: first.joints,
+                why: *why,
+                achieved_m: None,
+                travel_s: first.travel_s,
+                candidates: plan.candidates,
+                outcome: Outcome::Pending,
+            })),
+        }
+        next
+    }
+
+    fn found(&mut self, known: &Known<'_>, used: &[(Pose<Base, Tip>, Vec<usize>)], cancel: &CancelToken) -> Next {
+        if let Some(ending) = self.ending(known, used.len()) {
+            return Next::End(ending);
+        }
+        if self.failures >= MOST_FAILURES && self.range.is_some() {
+            return Next::End(Ending::BoardLost { poses: self.failures });
+        }
+        let contact = |robot: &Robot| robot.arm.contact(&robot.joints, &robot.around, robot.clearance_m);
+        if let (0..=1, Some(by)) = (used.len(), known.robot.and_then(contact)) {
+            return Next::End(Ending::StartBlocked { by });
+        }
+        let target = &known.observations.target;
+        let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));
+        let Some(model) = model else { return self.without_answer(known, cancel) };
+        let least = if used.len() < CAREFUL_VIEWS { &CAREFUL_NOISE } else { &LEAST_NOISE };
+        let noise = at_least(model.noise(), least);
+        let model = model.with_noise(noise);
+        if self.range.is_none() && known.calibration.is_none_or(|it| camera_unsure_m(it) > CAREFUL_ROOM_M) {
+            return self.first_poses(known, cancel);
+        }
+        match self.plan(known, &model, used, cancel) {
+            None => self.without_answer(known, cancel),
+            Some((plan, modelled_m)) if plan.candidates > 0 => {
+                self.judged(plan, modelled_m, used.len(), self.is_sound(known.calibration))
+            }
+            // So little is known that no view is surely in the image: more of the first poses.
+            Some(_) => self.first_poses(known, cancel),
+        }
+    }
+
+    /// The first turns are for before there is an answer: later the arm is elsewhere, and they are no small moves.
+    fn without_answer(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
+        if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.first_poses(known, cancel) }
+    }
+
+    /// The plan from an estimate, and its error now by the noise alone, metres; `None` where the views so far determine nothing.
+    fn plan(
+        &mut self,
+        known: &Known<'_>,
+        model: &ViewModel,
+        used: &[(Pose<Base, Tip>, Vec<usize>)],
+        cancel: &CancelToken,
+    ) -> Option<(Plan, f64)> {
+        let modelled_m = modelled_error_m(known.calibration?, self.options.tool_box.as_ref())?;
+        let ground = self.ground(known, model, used, cancel)?;
+        self.range = Some(ground.range);
+        let options = ChooseOptions {
+            candidates: self.options.candidates,
+            ahead: self.options.ahead.min(self.options.most_views.saturating_sub(used.len())).max(1),
+            seed: self
+                .options
+                .seed
+                .wrapping_add(known.observations.views.len() as u64)
+                .wrapping_add(977 * self.failed.len() as u64),
+            dwell_s: self.options.dwell_s,
+            failed: &self.failed,
+            turn_rad: if used.len() < CAREFUL_VIEWS {
+                (TURN_PER_VIEW_RAD * used.len() as f64).min(turn_after(self.skips))
+            } else {
+                turn_after(self.skips)
+            },
+            doubts: self.doubts(),
+        };
+        let chooser = ground.chooser(model, &known.observations.target);
+        Some((chooser.plan(&ground.design, &options), modelled_m))
+    }
+
+    /// A pose that was not designed, to check the answer at: a view at random that the arm gets to. `index` counts the
+    /// checks, `skips` those that somebody left out. `None` where there is no answer, or no such view.
+    pub fn check_pose(&self, known: &Known<'_>, index: usize, skips: usize, cancel: &CancelToken) -> Option<Proposal> {
+        let target = &known.observations.target;
+        let model = ViewModel::new(known.calibration?, target)?;
+        let model = model.clone().with_noise(at_least(model.noise(), &LEAST_NOISE));
+        let used = used_views(known.observations, known.fit());
+        let ground = self.ground(known, &model, &used, cancel)?;
+        let options = ChooseOptions {
+            candidates: CHECK_CANDIDATES,
+            ahead: 1,
+            // Apart from the seeds of the plans.
+            seed: self.options.seed.wrapping_add(1_000_003 * (index as u64 + 1)),
+            dwell_s: self.options.dwell_s,
+            failed: &self.failed,
+            turn_rad: turn_after(skips),
+            doubts: 1.0,
+        };
+        ground.chooser(&model, target).at_random(&ground.design, &options)
+    }
+
+    /// What a choice stands on; `None` where the views so far determine nothing.
+    fn ground<'c>(
+        &self,
+        known: &Known<'_>,
+        model: &ViewModel,
+        used: &[(Pose<Base, Tip>, Vec<usize>)],
+        cancel: &'c CancelToken,
+    ) -> Option<Ground<'c>> {
+        let joint = known.calibration?.joint.as_ref()?;
+        let target = &known.observations.target;
+        let views = expected_views(model, used);
+        let weight = match &self.options.tool_box {
+            None => design::weight_about(&joint.reference_point, target),
+            Some(tool_box) => design::weight_over(&tool_box.corners_and_middle()),
+        };
+        let design = Design::new(model.prior(), &views, weight)?;
+        let distances =
+            used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
+        let range = self.range.or_else(|| ViewRange::about(distances))?;
+        let taken = used.iter().map(|(pose, _)| *pose).collect();
+        let room_m = if used.len() < CAREFUL_VIEWS { CAREFUL_ROOM_M } else { 0.0 };
+        let robot = known.robot.map(|robot| with_board(robot, model.hand_eye(), known.observations, room_m));
+        Some(Ground { design, range, robot, taken, cancel })
+    }
+
+    /// What failed was expected to be in the image: the estimate is worse than it says.
+    fn doubts(&self) -> f64 {
+        1.0 + self.failures as f64
+    }
+
+    /// Whether nothing was found that speaks against the answer. An explanation that it does not count on, and that moves it by a
+    /// small part of the goal, is none that has to be resolved for this goal.
+    fn is_sound(&self, calibration: Option<&Calibration>) -> bool {
+        let Some(calibration) = calibration else { return false };
+        match calibration.claim() {
+            Claim::AsModelled => true,
+            Claim::Nothing => false,
+            claim @ Claim::Moved(_) => {
+                let moved_m = worst(calibration, self.options.tool_box.as_ref(), |point| Some(claim.moved_m(point)));
+                moved_m.is_some_and(|moved_m| moved_m <= SMALL_PART * self.options.goal_m)
+            }
+        }
+    }
+
+    fn judged(&self, plan: Plan, modelled_m: f64, views: usize, is_sound: bool) -> Next {
+        let Some(first) = plan.proposals.first() else {
+            return Next::End(Ending::NothingInReach { candidates: plan.candidates });
+        };
+        let gain = 1.0 - plan.best_ratio;
+        if views >= LEAST_VIEWS && gain < self.options.least_gain {
+            return Next::End(if is_sound { Ending::LittleToGain { gain } } else { Ending::Doubted });
+        }
+        let to_m = modelled_m * first.error_ratio;
+        let why = Why::Gain { from_m: modelled_m, to_m, rotation_part: first.rotation_part };
+        Next::Go { plan, why }
+    }
+
+    fn ending(&mut self, known: &Known<'_>, views: usize) -> Option<Ending> {
+        if let Some(calibration) = known.calibration.filter(|_| views >= LEAST_VIEWS && views != self.solved_views) {
+            self.solved_views = views;
+            let tool_box = self.options.tool_box.as_ref();
+            let error_m = worst(calibration, tool_box, |point| calibration.error_95_m(point));
+            let is_below =
+                error_at_upper_levels(calibration, tool_box).is_some_and(|error_m| error_m <= self.options.goal_m);
+            self.below = if is_below && self.is_sound(known.calibration) { self.below + 1 } else { 0 };
+            if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
+                return Some(Ending::GoalReached { error_m });
+            }
+        }
+        let in_fit = known.observations.views.iter().filter(|view| view.in_fit && view.corners.is_some()).count();
+        if in_fit >= self.options.most_views {
+            return Some(Ending::MostViews);
+        }
+        (known.elapsed_s >= self.options.most_s).then_some(Ending::MostTime)
+    }
+}
+
+/// What a choice stands on.
+struct Ground<'c> {
+    design: Design,
+    range: ViewRange,
+    robot: Option<Robot>,
+    taken: Vec<Pose<Base, Tip>>,
+    cancel: &'c CancelToken,
+}
+
+impl Ground<'_> {
+    fn chooser<'a>(&'a self, model: &'a ViewModel, target: &'a TargetSpec) -> Chooser<'a> {
+        Chooser {
+            model,
+            target,
+            range: &self.range,
+            robot: self.robot.as_ref(),
+            taken: &self.taken,
+            cancel: self.cancel,
+        }
+    }
+}
+
+/// How far the tip may turn from the nearest view so far, after so many more poses that somebody left out than took, radians:
+/// where the arm has been it gets to again.
+fn turn_after(skips: usize) -> f64 {
+    (std::f64::consts::PI * NEARER_PER_SKIP.powf(skips as f64)).max(LEAST_TURN_RAD)
+}
+
+/// The error that is stated, at the upper limit of the noise levels, metres: where the camera saw the board, or at the worst point
+/// of a box. `None` where nothing may be stated.
+pub fn error_at_upper_levels(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
+    let joint = calibration.joint.as_ref()?;
+    let hand_eye = calibration.hand_eye_covariance()?;
+    worst(calibration, tool_box, |point| {
+        let stated_m = calibration.error_95_m(point)?;
+        let plain_m = point_error::radius_95(&(point_error::covariance(hand_eye, point) / joint.small_sample.scale));
+        Some(stated_m.max(plain_m * upper_level(joint.small_sample.degrees_of_freedom)))
+    })
+}
+
+/// How far the camera may be from where the estimate has it on its mount, 95 %, metres.
+fn camera_unsure_m(calibration: &Calibration) -> f64 {
+    calibration.modelled_error_95_at(&Point3::origin()).unwrap_or(f64::INFINITY)
+}
+
+/// The error by the noise alone where the goal is judged, metres.
+fn modelled_error_m(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
+    worst(calibration, tool_box, |point| calibration.modelled_error_95_at(point))
+}
+
+/// The largest value over the corners of a box, where errors are largest, or that where the camera saw the board.
+fn worst(
+    calibration: &Calibration,
+    tool_box: Option<&TipBox>,
+    error_m: impl Fn(&Point3<f64>) -> Option<f64>,
+) -> Option<f64> {
+    match tool_box {
+        None => error_m(&calibration.joint.as_ref()?.reference_point),
+        Some(tool_box) => {
+            let errors: Option<Vec<f64>> = tool_box.corners_and_middle().iter().map(error_m).collect();
+            errors?.into_iter().reduce(f64::max)
+        }
+    }
+}
+
+/// The upper limit of a noise level over its estimate from so many numbers.
+fn upper_level(degrees_of_freedom: f64) -> f64 {
+    match ChiSquared::new(degrees_of_freedom) {
+        Ok(chi) if degrees_of_freedom.is_finite() => {
+            (degrees_of_freedom / chi.inverse_cdf(1.0 - LEVEL_SURE)).max(1.0).sqrt()
+        }
+        _ => 1.0,
+    }
+}
+
+/// Reported tip poses of the views that are in the fit, and the indices of the corners found in them.
+fn used_views(observations: &Observations, fit: Option<&Fit>) -> Vec<(Pose<Base, Tip>, Vec<usize>)> {
+    let is_used =
+        |index: usize| fit.is_none_or(|fit| fit.views.get(index).is_some_and(|view| view.status == ViewStatus::Used));
+    let of_view = |(index, view): (usize, &handeye_estimate::ObservedView)| {
+        let corners = view.corners.as_ref().filter(|_| view.in_fit && is_used(index))?;
+        Some((view.base_from_tip?, corners.iter().map(|corner| corner.index).collect()))
+    };
+    observations.views.iter().enumerate().filter_map(of_view).collect()
+}
+
+/// What views that were taken say by a model.
+fn expected_views(model: &ViewModel, used: &[(Pose<Base, Tip>, Vec<usize>)]) -> Vec<ExpectedView> {
+    used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect()
+}
+
+fn at_least(noise: &Noise, least: &Noise) -> Noise {
+    Noise {
+        corner_px: noise.corner_px.max(least.corner_px),
+        robot_m: noise.robot_m.max(least.robot_m),
+        robot_rad: noise.robot_rad.max(least.robot_rad),
+        ..*noise
+    }
+}
+
+#[cfg(test)]
+mod tests;

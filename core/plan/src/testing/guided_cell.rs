@@ -1,0 +1,432 @@
+//! A cell that takes the poses that guided capture proposes: an arm, a camera and a board whose places are known.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::guided::choose::Robot;
+use crate::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
+use crate::{self as plan, ArmBody, Carried, Obstacle, Pace, Surroundings};
+use handeye_arm::testing as arms;
+use handeye_arm::{Arm, ArmKind, JointValues};
+use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::handeye::joint::correction_transform;
+use handeye_estimate::handeye::joint::{Noise, RobotField, ViewModel};
+use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_estimate::testing::sessions::{BOARD, REALISTIC, camera, noise_twist, reported, seen};
+use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView};
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+
+/// Arms of the cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellArm {
+    /// UR5e, six joints, closed form.
+    Ur5e,
+    /// Franka Panda, seven joints.
+    Panda,
+    /// UFACTORY xArm 6, six joints, no closed form.
+    Xarm6,
+}
+
+impl CellArm {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Ur5e, Self::Panda, Self::Xarm6];
+
+    fn chain(self) -> Arm {
+        let from_file = |file: arms::ArmFile| file.arm().expect("a file of this project");
+        match self {
+            Self::Ur5e => ArmKind::Ur5e.arm(),
+            Self::Panda => from_file(arms::PANDA),
+            Self::Xarm6 => from_file(arms::XARM6),
+        }
+    }
+
+    /// Over a board in front of the arm.
+    fn home(self) -> Vec<f64> {
+        match self {
+            // Its base looks along -x.
+            Self::Ur5e => vec![std::f64::consts::PI, -1.6, 1.9, -1.9, -1.57, 0.0],
+            Self::Panda => vec![0.0, -0.7, 0.0, -2.27, 0.0, 1.57, 0.785],
+            Self::Xarm6 => vec![0.0, -0.52, -1.05, 0.0, 1.57, 0.0],
+        }
+    }
+}
+
+/// What a cell is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct CellSetup {
+    /// The arm.
+    pub arm: CellArm,
+    /// Where the camera sits.
+    pub mode: Mode,
+    /// What corners and robot err by.
+    pub noise: Noise,
+    /// Whether the lens is to be estimated.
+    pub free_lens: bool,
+    /// Focal length \[px\] of a first view that is straight on, with the board close to the edge of the image; `None` for that
+    /// of the other studies, and a first view that is tilted a little.
+    pub straight: Option<f64>,
+    /// What is not as it is said to be.
+    pub untold: Untold,
+    /// Seed of places and noise.
+    pub seed: u64,
+}
+
+impl CellSetup {
+    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is said to be.
+    pub fn new(arm: CellArm, mode: Mode, seed: u64) -> Self {
+        Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: Untold::NOTHING, seed }
+    }
+}
+
+/// What a guide is not told, and what its estimate has to find out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Untold {
+    /// Deflection of the middle of the board against its edges along x and along y, metres.
+    pub bend_m: [f64; 2],
+    /// True focal length over that of the lens which is said to be known.
+    pub focal: f64,
+}
+
+impl Untold {
+    /// All is as it is said to be.
+    pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0 };
+}
+
+/// Where everything is in a cell, and what its arm must not touch.
+#[derive(Debug, Clone)]
+pub struct Places {
+    /// The arm, with nothing on its tip.
+    pub arm: plan::Arm,
+    /// Where its joints are at the first view, radians; of a prismatic joint metres.
+    pub joints: JointValues,
+    /// What stands around, besides camera and board.
+    pub around: Surroundings,
+    /// The camera on its mount.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// The board.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// The lens.
+    pub intrinsics: Intrinsics,
+}
+
+/// From the first pose to where errors of the robot that depend on the place have the size of the noise, metres: about
+/// the RMS spread of the tip in a guided session.
+const FIELD_SPREAD_M: f64 = 0.15;
+/// No pose is farther from the first one than this, metres.
+const FIELD_REACH_M: f64 = 2.0;
+
+/// The cell.
+#[derive(Debug, Clone)]
+pub struct GuidedCell {
+    setup: CellSetup,
+    rng: ChaCha8Rng,
+    intrinsics: Intrinsics,
+    /// The true camera on its mount.
+    pub mount_from_camera: Pose<Mount, Camera>,
+    /// The true place of the board.
+    pub anchor_from_target: Pose<Anchor, Target>,
+    /// The arm where it stands now.
+    pub robot: Robot,
+    /// What was seen so far.
+    pub observations: Observations,
+    /// The board as it is.
+    points: Vec<Point3<f64>>,
+    /// Errors of the robot that depend on where it stands.
+    field: Option<RobotField>,
+}
+
+/// What came of a guided session.
+#[derive(Debug, Clone)]
+pub struct GuidedRun {
+    /// Why it ended.
+    pub ending: Ending,
+    /// The calibration at the end.
+    pub calibration: Option<Calibration>,
+    /// Moves that showed no board.
+    pub failed: usize,
+    /// Of each number of views with an answer: views, stated 95 % error and true error, metres.
+    pub history: Vec<(usize, f64, f64)>,
+    /// Every pose that was proposed.
+    pub steps: Vec<Step>,
+    /// When the views were taken, seconds.
+    pub times_s: Vec<f64>,
+}
+
+/// Free space that the arm keeps, metres.
+const CLEARANCE_M: f64 = 0.02;
+/// How fast its joints are driven.
+const PACE: Pace = Pace { speed: 1.0, acceleration: 2.0, jerk: f64::INFINITY };
+/// Table on which the arm stands.
+const TABLE: [f64; 3] = [4.0, 4.0, 0.1];
+
+impl GuidedCell {
+    /// Draws the places of camera and board, with the board in view of an arm that touches nothing.
+    ///
+    /// # Panics
+    /// When there are no such places: a mistake in the setup.
+    pub fn new(setup: CellSetup) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
+        let cell = |places| Self::within_reach(setup, places);
+        let mut cell = (0..1000).find_map(|_| cell(drawn(setup, &mut rng)?)).expect("most places are good");
+        let Noise { field_m, field_rad, .. } = setup.noise;
+        if field_m > 0.0 || field_rad > 0.0 {
+            let mut slopes = |size: f64| Matrix3::from_fn(|_, _| noise_twist(&mut rng, size, 0.0).x / FIELD_SPREAD_M);
+            let (position, orientation) = (slopes(field_m), slopes(field_rad));
+            let origin_m = cell.base_from_tip().translation();
+            cell.field = Some(RobotField::new(origin_m, FIELD_REACH_M, &position, &orientation));
+        }
+        cell
+    }
+
+    /// With places that are given, for which `arm`, `straight` and errors that depend on the place are left out of the setup;
+    /// `None` where the arm touches something at the first view, or the board is not wholly in it.
+    pub fn placed(setup: CellSetup, places: Places) -> Option<Self> {
+        let cell = Self::within_reach(setup, places)?;
+        cell.clone().view(&cell.base_from_tip()).map(|_| cell)
+    }
+
+    /// `None` where the arm touches something at the first view.
+    fn within_reach(setup: CellSetup, places: Places) -> Option<Self> {
+        let Places { mut arm, joints, around, mount_from_camera, anchor_from_target, intrinsics: lens } = places;
+        let (carried, beside) = match setup.mode {
+            Mode::EyeInHand => {
+                let board = plan::sheet(&BOARD, &Pose::from_isometry(*anchor_from_target.isometry()), 0.0);
+                (Carried::camera(mount_from_camera.isometry()), board)
+            }
+            Mode::EyeToHand => {
+                let camera = plan::housing(&Pose::from_isometry(*mount_from_camera.isometry()), 0.0);
+                (Carried::board(&BOARD, &Pose::from_isometry(*anchor_from_target.isometry()), 0.0), camera)
+            }
+        };
+        arm.carried = vec![carried];
+        // Where the other of camera and board is the guide has to find out.
+        let all = around.clone().and(Surroundings::of(vec![beside]));
+        if !arm.is_free(&joints, &all, CLEARANCE_M) {
+            return None;
+        }
+        // With all that is estimated of a lens by default, of which it may have none.
+        let free = match lens.distortion {
+            Distortion::None => Intrinsics { distortion: DEFAULT_MODEL, ..lens },
+            _ => lens,
+        };
+        let focal = setup.untold.focal;
+        let said = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
+        let shape = BoardShape { warp_m: setup.untold.bend_m, ..BoardShape::FLAT };
+        let (intrinsics, knowledge) =
+            if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(said)) };
+        Some(Self {
+            setup,
+            rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),
+            intrinsics,
+            mount_from_camera,
+            anchor_from_target,
+            robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, pace: PACE, sight: None },
+            observations: Observations {
+                mode: Some(setup.mode),
+                target: BOARD,
+                image_size: (intrinsics.width, intrinsics.height),
+                camera: knowledge,
+                views: Vec::new(),
+            },
+            points: BoardPoints::new(&BOARD.points()).points(&shape),
+            field: None,
+        })
+    }
+
+    /// Where the controller says the tip is.
+    ///
+    /// # Panics
+    /// Never: the joints are those of the arm.
+    pub fn base_from_tip(&self) -> Pose<Base, Tip> {
+        self.robot.arm.tip(&self.robot.joints).expect("its own joints")
+    }
+
+    /// Drives the arm there and captures; whether the whole board was in the image.
+    pub fn capture(&mut self, joints: &JointValues) -> bool {
+        self.robot.joints = *joints;
+        self.capture_at(&self.base_from_tip())
+    }
+
+    /// Captures at a tip pose that the robot reports, however it got there; whether the whole board was in the image.
+    pub fn capture_at(&mut self, base_from_tip: &Pose<Base, Tip>) -> bool {
+        let Some(view) = self.view(base_from_tip) else { return false };
+        self.observations.views.push(view);
+        true
+    }
+
+    /// What would be captured at a tip pose that the robot reports.
+    fn view(&mut self, base_from_tip: &Pose<Base, Tip>) -> Option<ObservedView> {
+        // The error goes the other way round: where the tip truly is, of where it is said to be.
+        let error = reported(&mut self.rng, &Pose::identity(), &self.setup.noise).inverse();
+        let by_place = self
+            .field
+            .as_ref()
+            .map_or_else(Isometry3::identity, |field| correction_transform(&field.correction(base_from_tip)));
+        let true_tip = Pose::from_isometry(base_from_tip.isometry() * by_place * error.isometry());
+        let camera_from_target = handeye_estimate::handeye::joint::camera_from_target(
+            self.setup.mode,
+            &true_tip,
+            &self.mount_from_camera,
+            &self.anchor_from_target,
+        );
+        let no_more = |_| Vector2::zeros();
+        let corners = seen(
+            &mut self.rng,
+            &self.intrinsics,
+            camera_from_target.isometry(),
+            &self.points,
+            self.setup.noise.corner_px,
+            no_more,
+        )?;
+        let name = format!("view {}", self.observations.views.len());
+        Some(ObservedView::new(name, Some(*base_from_tip), Some(corners.into())))
+    }
+
+    /// How far a calibration puts a point from where it is, metres: where the camera saw the board, which is where the
+    /// expected error is stated.
+    pub fn true_error_m(&self, calibration: &Calibration) -> Option<f64> {
+        let estimated = calibration.hand_eye?.mount_from_camera();
+        let point = calibration.joint.as_ref()?.reference_point;
+        let off = (self.mount_from_tip() * self.mount_from_camera).inverse() * estimated;
+        Some((off.isometry() * point - point).norm())
+    }
+
+    /// What errors of the robot that depend on the place are in the middle of the session's places: a camera on the tip
+    /// cannot be told from one that is off by as much, and measures with the same arm.
+    fn mount_from_tip(&self) -> Pose<Mount, Mount> {
+        let tips = self.observations.views.iter().filter_map(|view| view.base_from_tip);
+        let count = self.observations.views.len() as f64;
+        let middle = tips.map(|tip| tip.translation()).sum::<Vector3<f64>>() / count;
+        let at_middle = Pose::from_isometry(Translation3::from(middle).into());
+        match (&self.field, self.setup.mode) {
+            (Some(field), Mode::EyeInHand) => Pose::from_isometry(correction_transform(&field.correction(&at_middle))),
+            _ => Pose::identity(),
+        }
+    }
+
+    /// The model of what is true.
+    pub fn truth(&self) -> ViewModel {
+        let Self { setup, intrinsics, mount_from_camera, anchor_from_target, .. } = self;
+        let hand_eye = HandEye::new(setup.mode, *mount_from_camera, *anchor_from_target);
+        ViewModel::known(hand_eye, *intrinsics, setup.free_lens, setup.noise, &BOARD)
+    }
+
+    /// What a guide is told, with an answer from the views so far.
+    pub fn known<'a>(&'a self, calibration: Option<&'a Calibration>, elapsed_s: f64) -> Known<'a> {
+        Known { observations: &self.observations, calibration, robot: Some(&self.robot), elapsed_s }
+    }
+
+    /// The calibration from the views so far.
+    pub fn calibrate(&self) -> Option<Calibration> {
+        calibrate(&self.observations, Method::Joint, &CancelToken::default()).ok()
+    }
+
+    /// A whole guided session from the first view on.
+    pub fn run(&mut self, options: GuidedOptions) -> GuidedRun {
+        let mut guide = Guide::new(options);
+        let first = self.robot.joints;
+        let (mut failed, mut history, mut calibration) = (0, Vec::new(), None);
+        let mut time_s = guide.options().dwell_s;
+        let mut times_s = vec![time_s];
+        assert!(self.capture(&first), "the board is in view at the beginning");
+        loop {
+            let known = self.known(calibration.as_ref(), time_s);
+            let plan = match guide.next(&known, &CancelToken::default()) {
+                Next::End(ending) => {
+                    let steps = guide.steps().to_vec();
+                    return GuidedRun { ending, calibration, failed, history, steps, times_s };
+                }
+                Next::Go { plan, .. } => plan,
+            };
+            let proposal = &plan.proposals[0];
+            let joints = proposal.joints.expect("the chain is known");
+            time_s += proposal.travel_s + guide.options().dwell_s;
+            if self.capture(&joints) {
+                times_s.push(time_s);
+                guide.captured();
+                calibration = self.calibrate();
+                if let Some(solved) = &calibration
+                    && let (Some(stated), Some(truth)) = (solved.tip_error_95_m(), self.true_error_m(solved))
+                {
+                    history.push((self.observations.views.len(), stated, truth));
+                }
+            } else {
+                failed += 1;
+                guide.failed();
+            }
+        }
+    }
+}
+
+/// Places at random, with the board in view of an arm that gets there; `None` where it does not.
+fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Places> {
+    let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    // The middle of the board over the table, a little tilted, its printed side up; z of a target points into it.
+    let in_front = Vector3::new(0.42 + about(0.05), about(0.12), 0.06 + about(0.03));
+    let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0));
+    let lying = Isometry3::from_parts(in_front.into(), yaw * down * tilt(about(0.15), about(0.15)))
+        * Translation3::from(-BOARD.centre().coords);
+    let beside = Isometry3::from_parts(
+        Vector3::new(0.06 + about(0.02), about(0.03), 0.04 + about(0.02)).into(),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)) * tilt(about(0.2), about(0.2)),
+    );
+    let distance_m = 0.38 + about(0.06);
+    let seen_first = Isometry3::from_parts(
+        Vector3::new(about(0.03), about(0.03), distance_m).into(),
+        tilt(about(0.2), about(0.2)) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.5)),
+    ) * Translation3::from(-BOARD.centre().coords);
+    let lens = setup.straight.map_or_else(camera, |focal_px| Intrinsics::pinhole(640, 480, focal_px));
+    let seen_first = match setup.straight {
+        // Some 40 px from the edge of the image of 640 px; BOARD is 135 mm wide.
+        Some(focal_px) => {
+            Isometry3::translation(280.0 * distance_m / focal_px - 0.0675, 0.0, distance_m)
+                * Translation3::from(-BOARD.centre().coords)
+        }
+        None => seen_first,
+    };
+    let (mount_from_camera, anchor_from_target, first_tip) = match setup.mode {
+        Mode::EyeInHand => {
+            let first_tip = lying * seen_first.inverse() * beside.inverse();
+            (beside, lying, first_tip)
+        }
+        Mode::EyeToHand => {
+            // The camera stands on the far side and looks at the board that the arm holds up in front of it.
+            let board_at = Vector3::new(0.45 + about(0.05), about(0.1), 0.45 + about(0.05));
+            let facing = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2);
+            let camera_turn = facing * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(0.3));
+            let base_from_camera = Isometry3::from_parts((board_at + Vector3::x() * distance_m).into(), camera_turn);
+            let on_tip = Isometry3::from_parts(
+                Vector3::new(about(0.02), about(0.02), 0.05).into(),
+                down * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about(3.0)),
+            ) * Translation3::from(-BOARD.centre().coords);
+            (base_from_camera, on_tip, base_from_camera * seen_first * on_tip.inverse())
+        }
+    };
+    let chain = setup.arm.chain();
+    let arm = plan::Arm {
+        body: ArmBody::of(&chain),
+        chain,
+        world_from_arm: Isometry3::identity(),
+        connection_from_tip: Isometry3::identity(),
+        carried: Vec::new(),
+    };
+    let table = Obstacle::new("table", Isometry3::translation(0.0, 0.0, -TABLE[2] / 2.0 - 0.01), TABLE);
+    let joints = arm.reach(&Pose::from_isometry(first_tip), &setup.arm.home())?;
+    Some(Places {
+        arm,
+        joints,
+        around: Surroundings::of(vec![table]),
+        mount_from_camera: Pose::from_isometry(mount_from_camera),
+        anchor_from_target: Pose::from_isometry(anchor_from_target),
+        intrinsics: lens,
+    })
+}
+
+fn tilt(about_x: f64, about_y: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0))
+}

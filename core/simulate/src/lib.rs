@@ -1,0 +1,26 @@
+//! Images of targets whose corners are known, for tests, studies and benchmarks. No shipped program has it.
+//!
+//! | module | images |
+//! | --- | --- |
+//! | [`Scene`] | any target, as it is printed, through a lens: the exact area of every pixel |
+//! | [`flat_board`] | a chessboard seen straight on, with a blur that is known |
+//! | [`moving_board`] | a chessboard that moves, with depths |
+//!
+//! ```
+//! use handeye_geometry::camera::Intrinsics;
+//! use handeye_geometry::targets::Grid;
+//! use handeye_simulate::Scene;
+//! use nalgebra::Isometry3;
+//!
+//! let grid = Grid { columns: 9, rows: 6, square_m: 0.025 };
+//! let scene = Scene::new(Intrinsics::pinhole(640, 480, 600.0), grid, Isometry3::translation(-0.1, -0.0625, 0.5));
+//! assert_eq!((scene.render(1).dimensions(), scene.truth().len()), ((640, 480), 54));
+//! ```
+
+mod drawn;
+mod exact;
+pub mod flat_board;
+pub mod moving_board;
+mod scene;
+
+pub use scene::Scene;

@@ -1,0 +1,162 @@
+//! Images of targets through a camera with known corners.
+
+use image::{GrayImage, Luma};
+use nalgebra::{Isometry3, Vector2};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, Normal};
+
+use super::drawn::Drawn;
+use super::exact::Squares;
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_geometry::testing::looking_at;
+
+/// An image to be taken of a target.
+///
+/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper without end. Any target by [`Scene::drawn`]
+/// is the drawing that is printed, sampled ten by ten in pixels that an outline crosses, on its paper on a table.
+pub struct Scene {
+    /// The camera, with its lens.
+    pub camera: Intrinsics,
+    /// What is looked at.
+    pub target: TargetSpec,
+    /// Where it is.
+    pub camera_from_target: Isometry3<f64>,
+    /// Standard deviation of the lens blur in pixels, on top of the pixel's own area.
+    pub blur_px: f64,
+    /// Standard deviation of the noise in grey levels.
+    pub noise: f64,
+    /// Grey level of the ink.
+    pub dark: f64,
+    /// Grey level of the paper.
+    pub light: f64,
+    /// Change of the light across the width of the image, as a part of it.
+    pub fall: f64,
+    /// Left, top, right and bottom of something in front of the target \[px\].
+    pub covered: Option<[u32; 4]>,
+    /// Whether the square between the first four corners of a chessboard is dark.
+    pub first_dark: bool,
+    drawn: Option<Drawn>,
+}
+
+/// Grey level of what is around the paper and in front of it.
+const TABLE: f64 = 120.0;
+
+impl Scene {
+    /// A chessboard, exact to rounding.
+    pub fn new(camera: Intrinsics, grid: Grid, camera_from_target: Isometry3<f64>) -> Self {
+        Self {
+            camera,
+            target: TargetSpec::Chessboard(grid),
+            camera_from_target,
+            blur_px: 0.7,
+            noise: 0.0,
+            dark: 45.0,
+            light: 205.0,
+            fall: 0.0,
+            covered: None,
+            first_dark: true,
+            drawn: None,
+        }
+    }
+
+    /// A target of any kind as it is printed, with noise of one grey level.
+    ///
+    /// # Panics
+    /// When the target cannot be drawn.
+    pub fn drawn(target: TargetSpec, camera: Intrinsics, camera_from_target: Isometry3<f64>) -> Self {
+        let any = Grid { columns: 2, rows: 2, square_m: 1.0 };
+        Self { target, noise: 1.0, drawn: Some(Drawn::of(&target)), ..Self::new(camera, any, camera_from_target) }
+    }
+
+    /// The scene of the published figures: 640×480, f = 581 px, 10×7 corners of 15 mm at 0.4 to 0.6 m, tilted up to 40°.
+    pub fn random(rng: &mut ChaCha8Rng, max_tilt: f64, max_roll: f64) -> Self {
+        let camera = Intrinsics::pinhole(640, 480, 581.0);
+        let grid = Grid { columns: 10, rows: 7, square_m: 0.015 };
+        let angles = [
+            rng.random_range(0.0..max_tilt),
+            rng.random_range(0.0..std::f64::consts::TAU),
+            rng.random_range(-max_roll..max_roll),
+        ];
+        let offset = Vector2::new(rng.random_range(-60.0..60.0), rng.random_range(-40.0..40.0));
+        let pose = looking_at(&grid, &camera, rng.random_range(0.40..0.60), angles, offset);
+        Self::new(camera, grid, pose)
+    }
+
+    /// The chessboard.
+    ///
+    /// # Panics
+    /// For a target of another kind.
+    pub fn grid(&self) -> Grid {
+        match self.target {
+            TargetSpec::Chessboard(grid) => grid,
+            other => panic!("{other} is not a chessboard"),
+        }
+    }
+
+    /// Where all points are, in sight or not.
+    ///
+    /// # Panics
+    /// When one is behind the camera.
+    pub fn truth(&self) -> Vec<Vector2<f64>> {
+        let points = self.target.points().into_iter();
+        points.map(|p| self.camera.project(&(self.camera_from_target * p)).expect("in front")).collect()
+    }
+
+    /// The image with noise of its own.
+    pub fn render(&self, seed: u64) -> GrayImage {
+        self.render_with(&mut ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// The image with the noise that comes next.
+    ///
+    /// # Panics
+    /// When the target is seen edge-on, or the lens model does not reach the edge of an exact image.
+    pub fn render_with(&self, rng: &mut ChaCha8Rng) -> GrayImage {
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        let mut levels = match &self.drawn {
+            Some(drawn) => drawn.levels(self, TABLE),
+            None => Squares::of(self).levels(self),
+        };
+        if self.fall != 0.0 {
+            for (i, level) in levels.iter_mut().enumerate() {
+                *level *= 1.0 + self.fall * ((i % width) as f64 / width as f64 - 0.5);
+            }
+        }
+        if let Some([left, top, right, bottom]) = self.covered {
+            for v in top..bottom {
+                levels[v as usize * width..][left as usize..right as usize].fill(TABLE);
+            }
+        }
+        blur(&mut levels, width, height, self.blur_px);
+        let noise = Normal::new(0.0, self.noise).expect("a deviation");
+        GrayImage::from_fn(self.camera.width, self.camera.height, |u, v| {
+            let level = levels[v as usize * width + u as usize] + noise.sample(rng);
+            Luma([level.round().clamp(0.0, 255.0) as u8])
+        })
+    }
+}
+
+fn blur(levels: &mut [f64], width: usize, height: usize, sigma: f64) {
+    if sigma <= 0.0 {
+        return;
+    }
+    let reach = (5.0 * sigma).ceil() as i64;
+    let mut kernel: Vec<f64> = (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp()).collect();
+    let sum: f64 = kernel.iter().sum();
+    for k in &mut kernel {
+        *k /= sum;
+    }
+    for (count, stride, lines, line_stride) in [(width, 1, height, width), (height, width, width, 1)] {
+        for line in 0..lines {
+            let at = |i: i64| line * line_stride + i.clamp(0, count as i64 - 1) as usize * stride;
+            let blurred: Vec<f64> = (0..count as i64)
+                .map(|i| kernel.iter().zip(-reach..).map(|(k, offset)| k * levels[at(i + offset)]).sum())
+                .collect();
+            for (i, value) in blurred.into_iter().enumerate() {
+                levels[at(i as i64)] = value;
+            }
+        }
+    }
+}

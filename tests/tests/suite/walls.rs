@@ -1,0 +1,106 @@
+//! What must hold between crates beyond what Cargo refuses to build: no module that estimates names the truth, and a
+//! program that estimates is built without what it has no use for.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use handeye_tests::workspace_root;
+use serde_json::Value;
+
+/// What names the truth that a simulated cell publishes for reports and tests.
+const TRUTH: [&str; 3] = ["GroundTruth", "ground_truth", "TruthComparison"];
+
+/// Crates from whose sources an estimate comes.
+const ESTIMATING: [&str; 9] = ["arm", "capture", "detect", "estimate", "files", "geometry", "import", "plan", "track"];
+
+/// Lines of a source that name the truth, tests excepted.
+fn lines_that_name_the_truth(file: &Path, text: &str) -> Vec<String> {
+    let path = file.to_string_lossy().replace('\\', "/");
+    if path.ends_with("tests.rs") || path.contains("/tests/") {
+        return Vec::new();
+    }
+    let names_it = |line: &&str| TRUTH.iter().any(|word| line.contains(word));
+    text.lines().filter(names_it).map(|line| format!("{path}: {}", line.trim())).collect()
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder of sources") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn nothing_that_estimates_names_the_truth() {
+    let mut seen = Vec::new();
+    for name in ESTIMATING {
+        let mut files = Vec::new();
+        sources(&workspace_root().join("core").join(name).join("src"), &mut files);
+        assert!(!files.is_empty(), "core/{name} is not searched");
+        for file in &files {
+            let text = std::fs::read_to_string(file).expect("a source");
+            seen.extend(lines_that_name_the_truth(file, &text));
+            let broken = format!("{text}\nuse handeye_session::GroundTruth;\n");
+            let is_test = lines_that_name_the_truth(file, &broken).is_empty();
+            assert!(!is_test || file.to_string_lossy().contains("tests"), "{} is not searched", file.display());
+        }
+    }
+    assert!(seen.is_empty(), "{}", seen.join("\n"));
+}
+
+/// Names of the packages that a package of the workspace is built with, itself included.
+fn built_with(package: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--locked", "--offline", "--edges", "normal,build", "--prefix", "none", "--format", "{p}"])
+        .args(["--package", package])
+        .current_dir(workspace_root())
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.lines().filter_map(|line| line.split(' ').next()).map(ToOwned::to_owned).collect()
+}
+
+#[test]
+fn a_program_that_estimates_is_built_without_formats_windows_and_opencv() {
+    let heavy = ["rusqlite", "zstd", "mcap", "pdf-writer", "opencv", "rerun", "egui", "tokio", "zmq"];
+    let most: BTreeMap<&str, usize> = [("handeye_estimate", 60), ("handeye_python", 100)].into();
+    for (package, most) in most {
+        let built = built_with(package);
+        assert!(built.contains("handeye_geometry"), "{built:?}");
+        for name in heavy {
+            assert!(!built.contains(name), "{package} is built with {name}");
+        }
+        assert!(built.len() <= most, "{package} is built with {} crates, at most {most}: {built:?}", built.len());
+    }
+}
+
+#[test]
+fn the_description_of_a_crate_is_there_for_a_registry() {
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--no-deps", "--locked", "--offline"])
+        .current_dir(workspace_root())
+        .output()
+        .expect("cargo runs");
+    let metadata: Value = serde_json::from_slice(&output.stdout).expect("cargo prints JSON");
+    for package in metadata["packages"].as_array().expect("packages") {
+        let is_library =
+            package["manifest_path"].as_str().is_some_and(|path| path.replace('\\', "/").contains("/core/"));
+        let text = |key: &str| package[key].as_str().unwrap_or_default().to_owned();
+        assert!(!text("description").is_empty(), "{} has no description", text("name"));
+        let keywords = package["keywords"].as_array().map_or(0, Vec::len);
+        assert!(
+            !is_library
+                || text("name") == "handeye_said"
+                || text("name") == "handeye_python"
+                || (1..=5).contains(&keywords),
+            "{}",
+            text("name")
+        );
+    }
+}
