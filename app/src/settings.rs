@@ -2,7 +2,7 @@
 //!
 //! A value is taken from the first of these that has it: the command line, the environment (`HANDEYE_…`), the file
 //! (`$XDG_CONFIG_HOME/handeye-workbench/settings.toml`, or below `~/.config`), the defaults. The file is written only when
-//! the user changes a setting in the window. `docs/settings.md` lists the keys.
+//! the user changes a setting in the window. `docs/reference/settings.md` lists the keys.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -176,7 +176,7 @@ impl Settings {
     fn written(&self) -> String {
         let table = self.table();
         format!(
-            "# Settings of the Handeye Workbench, see docs/settings.md. Written when one is changed in the window.\n{table}"
+            "# Settings of the Handeye Workbench (docs/reference/settings.md), written when one is changed.\n{table}"
         )
     }
 }

@@ -67,7 +67,7 @@ enum Command {
     /// Open the workbench (the default).
     #[command(after_help = "Examples:\n  handeye gui --scene panda\n  handeye gui --connect tcp://192.168.0.7:23000")]
     Gui(GuiArgs),
-    /// Show the workbench in a browser, here or on another machine, until Ctrl-C (docs/browser.md).
+    /// Show the workbench in a browser, here or on another machine, until Ctrl-C (docs/reference/browser.md).
     #[command(after_help = "Examples:\n  handeye serve\n  handeye serve --bind 0.0.0.0 --port 8600")]
     Serve(ServeArgs),
     /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.

@@ -9,7 +9,7 @@ use super::heading;
 #[derive(Debug, Clone, Default, Args)]
 pub struct ObjectArgs {
     /// Object of the scene that is a part of the cell, such as tip=/Panda/Tip; may be given for each of arm, joints, tip,
-    /// target, camera, depth and board (docs/coppeliasim.md). As in the public UR5 scene if not given.
+    /// target, camera, depth and board (docs/reference/coppeliasim.md). As in the public UR5 scene if not given.
     #[arg(long = "object", value_name = "PART=PATH", value_parser = assignment, help_heading = heading::CELL)]
     objects: Vec<String>,
 }

@@ -110,7 +110,7 @@ pub(crate) fn write(file: &Path, text: &str) -> io::Result<()> {
         std::fs::create_dir_all(folder)?;
     }
     let head =
-        "# What the robot's arm keeps out of; docs/surroundings.md lists the keys. Lengths are metres in the base.\n";
+        "# What the robot's arm keeps out of; docs/reference/surroundings.md lists the keys. Lengths are metres in the base.\n";
     handeye_files::atomic_file::write(file, format!("{head}{text}").as_bytes())
 }
 

@@ -10,7 +10,7 @@
 //!
 //! What lasts (captures, calibrations, messages) is kept for a viewer that is opened later. What is live (images, the
 //! robot) is only of interest while it is new: what cannot be written in time is left out and counted.
-//! `docs/rerun_viewers.md` has the bounds.
+//! `docs/reference/rerun_viewers.md` has the bounds.
 
 mod arrangement;
 pub mod blueprint;

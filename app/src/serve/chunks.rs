@@ -14,7 +14,7 @@ use egui::epaint::{ClippedPrimitive, ClippedShape, Mesh, Primitive};
 pub struct Chunk {
     /// Of the bytes; two chunks with one hash are one chunk.
     pub hash: u64,
-    /// As in docs/browser.md.
+    /// As in docs/reference/browser.md.
     pub bytes: Arc<[u8]>,
 }
 

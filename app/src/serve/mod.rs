@@ -1,4 +1,4 @@
-//! The workbench in a browser: the window is drawn here, and pages show it (docs/browser.md has the protocol).
+//! The workbench in a browser: the window is drawn here, and pages show it (protocol: docs/reference/browser.md).
 //!
 //! One thread owns egui's context and the [`Window`](crate::gui::Window), as that of a desktop does ([`host`]). What it
 //! has drawn is a [`frame::Frame`]: triangles in chunks, and textures. Every page has a connection of its own

@@ -20,7 +20,7 @@
 //! reports, the tool need not be known ([`Arm::tip_by_joint_at`]).
 //!
 //! What joint offsets do to a calibration, and which of them it can find, is in `docs/maths/joint_offsets.md`; which arms
-//! there are, and where their numbers come from, in `docs/arms.md`.
+//! there are, and where their numbers come from, in `docs/reference/arms.md`.
 //!
 //! # Reference
 //! Denavit & Hartenberg 1955; Siciliano et al. 2009, "Robotics: modelling, planning and control", §2.8.2 (rows) and

@@ -8,7 +8,7 @@
 //!
 //! `dataset.toml` of the folder names the tables: `poses` under `[robot]` with the pose of the tip for each image, and
 //! `corners` under `[target]` with a row `image,column,row,u,v` for each corner that a detector found, pixel (0, 0) being
-//! the centre of the top-left pixel. `docs/dataset.md` has all of it.
+//! the centre of the top-left pixel. `docs/reference/dataset.md` has all of it.
 //!
 //! What it prints is where the camera is: on the tip for an eye-in-hand set, in the base for an eye-to-hand set; and how
 //! far off a point that is measured with it is expected to be.

@@ -161,7 +161,8 @@ fn head(text: &mut Text, folder: &Path, images: &[PathBuf], sizes: &BTreeMap<(u3
         "Description of a data set for handeye, with what was found in the folder. Nothing of it was guessed:",
     );
     text.comment(format!(
-        "of the lines that begin with \"{}\" take in those that are true, by removing these signs. docs/dataset.md has all keys.",
+        "of the lines that begin with \"{}\" take in those that are true, by removing these signs. \
+         docs/reference/dataset.md has all keys.",
         CHOICE.trim_end()
     ));
     text.comment("");
@@ -205,7 +206,7 @@ fn target(text: &mut Text, tables: &[Found]) {
         ],
     );
     text.line("\n[target]");
-    text.comment("What was looked at, with the keys of its kind (docs/targets.md).");
+    text.comment("What was looked at, with the keys of its kind (docs/reference/targets.md).");
     text.choices(
         "kind",
         &[

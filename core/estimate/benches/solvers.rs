@@ -1,6 +1,6 @@
 //! Speed of the solvers on simulated corners: `cargo bench -p handeye_core --bench solvers`.
 //!
-//! [`docs/benchmarks.md`](../../docs/benchmarks.md) has the comparison with other programs, which `tests/bench/solvers.py`
+//! `docs/studies/benchmarks.md` has the comparison with other programs, which `tests/bench/solvers.py`
 //! makes.
 
 use std::hint::black_box;

@@ -2,7 +2,7 @@
 //!
 //! Every format is one [`Format`] in [`formats`]. A file says in its first comment which way its transform goes, has
 //! every digit of every number, and is read back after writing and compared: a file that does not say what the result
-//! says is an error and not a file. `docs/exports.md` lists the formats with their readers, directions and units.
+//! says is an error and not a file. `docs/reference/exports.md` lists the formats with their readers, directions and units.
 //!
 //! # Example
 //! ```

@@ -29,7 +29,7 @@
 //! let tip_from_base: Pose<Tip, Base> = base_from_tip;
 //! ```
 //!
-//! The list of frames and their axes is `docs/conventions.md`.
+//! The list of frames and their axes is `docs/reference/conventions.md`.
 
 use std::fmt;
 use std::marker::PhantomData;

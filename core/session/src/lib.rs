@@ -16,7 +16,7 @@
 //! interrupted capture do no harm and are overwritten by the next; files of deleted captures stay, for undo.
 //!
 //! [`Document`] is what a session says, [`Edit`] what may be done to it, [`History`] both with undo, [`Store`] all
-//! three on a disk. The layout is described in `docs/session.md`.
+//! three on a disk. The layout is described in `docs/reference/session.md`.
 //!
 //! ```
 //! use handeye_estimate::handeye::Mode;

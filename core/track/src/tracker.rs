@@ -28,7 +28,7 @@ const USUAL_BLUR_PX: f64 = 0.8;
 ///
 /// Every image is taken by itself first: corners near where the board is expected, or the whole image searched for the
 /// whole board where nothing is expected or nothing was found there; then a pose with its covariance. A filter for
-/// constant velocity joins the images. The mathematics is in `docs/tracking.md`.
+/// constant velocity joins the images. The mathematics is in `docs/maths/tracking.md`.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     setup: Setup,

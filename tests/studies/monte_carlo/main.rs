@@ -16,7 +16,7 @@
 //!     --threads N         (1); no number depends on it
 //!     --seed N            (1)
 //!
-//! The result tables and what they mean are in `docs/accuracy.md`.
+//! The result tables and what they mean are in `docs/studies/accuracy.md`.
 
 mod answer;
 mod bound;

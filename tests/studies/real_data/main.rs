@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The number is that of random divisions; names of sets may follow. The data sets are looked for in `$HANDEYE_DATA`, then
-//! in `../shared/data`. What came out is in `docs/real_data.md`.
+//! in `../shared/data`. What came out is in `docs/studies/real_data.md`.
 
 mod blocks;
 mod checks;

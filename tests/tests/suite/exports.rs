@@ -15,7 +15,7 @@ use handeye_tests::{handeye_binary, workspace_root};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde_json::json;
 
-/// Tip to camera of the calibration that `docs/exports.md` shows.
+/// Tip to camera of the calibration that `docs/reference/exports.md` shows.
 const GOLDEN_M: [f64; 3] = [0.045, -0.032, 0.061];
 const GOLDEN_XYZW: [f64; 4] = [0.195832126, 0.036412615, 0.644503346, 0.738200065];
 

@@ -49,7 +49,7 @@ pub struct AutoArgs {
     #[command(flatten)]
     guided: GuidedArgs,
     /// What the arm must not touch, besides what the scene has: a file of boxes, with a work volume and limits of speed if wanted
-    /// (docs/surroundings.md). Every motion to joint values is then checked before it begins.
+    /// (docs/reference/surroundings.md). Every motion to joint values is then checked before it begins.
     #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
     keep_out: Option<PathBuf>,
     /// The chain of the arm by a built-in name or a URDF file, in place of the one that is read from the simulation. One
@@ -295,7 +295,7 @@ fn surroundings(
         (None, Some(_)) => {
             return Err(Failure::failed(anyhow::anyhow!(
                 "--keep-out needs an arm whose chain is known, to know what it would touch: leave the option out, or \
-                 give the scene an arm whose tip hangs on its base (docs/arms.md)"
+                 give the scene an arm whose tip hangs on its base (docs/reference/arms.md)"
             )));
         }
     };

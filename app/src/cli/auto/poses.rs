@@ -91,7 +91,8 @@ impl Plan {
     ) -> Result<Self, Failure> {
         let kinematics = kinematics.ok_or_else(|| {
             Failure::failed(anyhow::anyhow!(
-                "planned views take an arm whose chain is known (docs/arms.md): give the poses by a file, --poses FILE"
+                "planned views take an arm whose chain is known (docs/reference/arms.md): \
+                 give the poses by a file, --poses FILE"
             ))
         })?;
         let base_from_target = towards_board::base_from_target(arm, truth)?.ok_or_else(|| {

@@ -1,4 +1,4 @@
-//! Where everything is in the recording. `docs/rerun.md` lists the same.
+//! Where everything is in the recording. `docs/reference/rerun.md` lists the same.
 //!
 //! A transform on an entity is `parent_from_child` along the tree: `base/tip` holds `base_from_tip`. Everything with a
 //! pose is below [`BASE`] or [`TRUTH`], both of which coincide with the root.

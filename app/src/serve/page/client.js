@@ -1,5 +1,5 @@
 // The page of the Handeye Workbench: shows the frames that `handeye serve` draws, and sends what a person does.
-// The messages are described in docs/browser.md.
+// The messages are described in docs/reference/browser.md.
 'use strict';
 
 const element = (id) => document.getElementById(id);

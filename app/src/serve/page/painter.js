@@ -1,5 +1,5 @@
 // Draws the frames that `handeye serve` sends, on a thread of its own: the page stays free for what a person does, and
-// says in time that a button is still held. The messages are described in docs/browser.md.
+// says in time that a button is still held. The messages are described in docs/reference/browser.md.
 'use strict';
 
 class Painter {

@@ -1,4 +1,4 @@
-//! What stands around, in a file that a person writes; its keys are in `docs/surroundings.md`.
+//! What stands around, in a file that a person writes; its keys are in `docs/reference/surroundings.md`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};

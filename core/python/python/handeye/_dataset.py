@@ -1,4 +1,4 @@
-"""Dataset folders, as docs/dataset.md describes them."""
+"""Dataset folders, as docs/reference/dataset.md describes them."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ class Finding:
     """Something that was found in the data or in the answer."""
 
     code: str
-    """Machine-readable, such as outlier_view; see docs/diagnosis.md."""
+    """Machine-readable, such as outlier_view; see docs/reference/diagnosis.md."""
     severity: str
     """problem (the answer is not to be used), warning, advice or info."""
     message: str

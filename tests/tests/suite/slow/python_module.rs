@@ -68,7 +68,7 @@ fn python_gets_what_opencv_the_command_line_and_the_truth_say() {
 #[test]
 fn the_page_about_python_does_what_it_says() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = workspace_root().join("docs/python.md");
+    let page = workspace_root().join("docs/howto/python.md");
     let Some(text) = script("run_page.py", &[&handeye_binary(), &page, folder.path()]) else { return };
     println!("{text}");
 }

@@ -20,7 +20,7 @@ use handeye_tests::{CellProcess, handeye_binary, process};
 /// Longer than anything that a test waits for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
 
-/// What the recording may take of the memory of the workbench while a viewer hangs, see docs/rerun_viewers.md.
+/// What the recording may take of the memory of the workbench while a viewer hangs, see docs/reference/rerun_viewers.md.
 const MEMORY_BOUND: u64 = 512 * 1024 * 1024;
 
 fn shots() -> PathBuf {

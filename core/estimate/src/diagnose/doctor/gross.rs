@@ -24,7 +24,7 @@ const SOUND: f64 = 0.01;
 /// leave.
 const EXPLAINED: f64 = 0.05;
 /// And so many times less than the poses as they are. By the three together no gross fault was accused in 3,000 healthy
-/// simulated sessions, and those that were injected are found (`docs/diagnosis.md`).
+/// simulated sessions, and those that were injected are found (`docs/studies/diagnosis.md`).
 pub(super) const TIMES: f64 = 3.0;
 /// Hypotheses within this factor of the best count as equal; the simplest of them is taken. Two that are the same equations
 /// differ by rounding.

@@ -128,7 +128,7 @@ impl Registry {
         if constant {
             "attempt to call a number value (upvalue 'func')".to_owned()
         } else {
-            format!("No such function: {name} (functions of the built-in cell: docs/cell.md)")
+            format!("No such function: {name} (functions of the built-in cell: docs/reference/cell.md)")
         }
     }
 
