@@ -1,4 +1,4 @@
-//! Commands as they are pasted: those of README.md, and the examples in the help of each command.
+//! Commands as they are pasted: those of README.md and of the pages in docs/howto, and the examples in the help of each command.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt as _, symlink};
@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 
 use handeye_geometry::testing::python;
 use handeye_tests::{handeye_binary, workspace_root};
+use tempfile::TempDir;
 
 use crate::solved::{handeye, text};
 
@@ -55,14 +56,13 @@ fn run(script: &str, folder: &Path, programs: Option<&Path>) {
     assert!(output.status.success(), "{}\n{}\n{}", output.status, text(&output.stdout), text(&output.stderr));
 }
 
-/// A clone of the project: what its commands name is there, and nothing that an earlier run has made.
-#[test]
-fn the_commands_of_the_readme_work_as_they_are_one_after_the_other() {
-    let Some(python) = python() else { return };
-    let page = fs::read_to_string(workspace_root().join("README.md")).expect("a page");
-    let blocks = blocks(&page);
+/// Runs the blocks of a page that are marked `sh` in a folder like a clone of the project: what its commands name is there, and
+/// nothing that an earlier run has made. The number of commands, and the folder.
+fn run_page(page: &Path, python: &Path) -> (usize, TempDir) {
+    let text = fs::read_to_string(page).expect("a page");
+    let blocks = blocks(&text);
     for (mark, block) in &blocks {
-        assert!(["sh", "console", "python"].contains(mark), "```{mark}\n{block}");
+        assert!(["sh", "console", "python", "text"].contains(mark), "{}: ```{mark}\n{block}", page.display());
     }
     let home = tempfile::tempdir().expect("a folder");
     symlink(workspace_root().join("assets"), home.path().join("assets")).expect("linked");
@@ -70,12 +70,25 @@ fn the_commands_of_the_readme_work_as_they_are_one_after_the_other() {
     fs::write(&run_file, "#!/bin/sh\nexec handeye \"$@\"\n").expect("written");
     fs::set_permissions(&run_file, fs::Permissions::from_mode(0o755)).expect("made a program");
     let script: String = blocks.into_iter().filter(|(mark, _)| *mark == "sh").map(|(_, block)| block).collect();
-    assert!(script.lines().count() > 15, "{script}");
     run(&script, home.path(), python.parent());
-    for made in ["my_session/exports", "realistic", "guided", "results", "imported/dataset.toml", "board.pdf", "files"]
-    {
+    (script.lines().count(), home)
+}
+
+#[test]
+fn the_commands_of_the_readme_work_as_they_are_one_after_the_other() {
+    let Some(python) = python() else { return };
+    let (_, home) = run_page(&workspace_root().join("README.md"), &python);
+    for made in ["my_session/exports", "result.json", "files"] {
         assert!(home.path().join(made).exists(), "{made}");
     }
+}
+
+#[test]
+fn the_commands_of_every_how_to_work_as_they_are_one_after_the_other() {
+    let Some(python) = python() else { return };
+    let pages = fs::read_dir(workspace_root().join("docs/howto")).expect("a folder");
+    let commands: usize = pages.map(|page| run_page(&page.expect("an entry").path(), &python).0).sum();
+    assert!(commands > 15, "{commands}");
 }
 
 /// The commands that are in the list of a help.
