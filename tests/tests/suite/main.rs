@@ -3,6 +3,7 @@
 //! `slow` is what the fast tier (`./test fast`) leaves out: real-time sequences, desktops, browsers, the long fuzz.
 
 mod command_line;
+mod documents;
 mod exports;
 mod hostile_clients;
 mod imports;
