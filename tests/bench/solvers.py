@@ -1,6 +1,6 @@
 """Our solvers beside those of others, on identical corners, in one run, each on one thread.
 
-    cargo build --release -p handeye_core --example solver_times
+    cargo build --release -p handeye_studies --example solver_times
     cargo build --release --manifest-path tests/bench/peers/Cargo.toml        # for the crate vision-calibration
     pip install numpy opencv-python-headless
     apt install mrcal                                                         # optional, Debian

@@ -1,7 +1,7 @@
 //! Monte-Carlo study of a camera without a robot: whether what is stated of the lens holds, and whether boards are called
 //! bent when they are.
 //!
-//!     cargo run --release -p handeye_core --example camera_alone -- TRIALS [flat]
+//!     cargo run --release -p handeye_studies --example camera_alone -- TRIALS [flat]
 //!
 //! Prints Markdown: the tables of `docs/maths/camera_alone.md`. Every cell runs so many sessions through `calibrate`:
 //! 640×480, f = 581 px, five distortion coefficients, 10×7 corners of 30 mm, 0.5 to 0.8 m away, tilted by 11° to 40°, 0.1 px

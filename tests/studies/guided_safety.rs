@@ -2,7 +2,7 @@
 //! it, judged by points on the surfaces of everything that moves.
 //!
 //! ```text
-//! cargo run --release -p handeye_core --example guided_safety -- 2000
+//! cargo run --release -p handeye_studies --example guided_safety -- 2000
 //! ```
 //!
 //! The second row is the same with a lens that has to be found, so that less is known at the beginning. The third one is the

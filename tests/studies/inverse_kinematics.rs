@@ -1,6 +1,6 @@
 //! How many reachable goals the inverse kinematics reaches, and how long it takes.
 //!
-//!     cargo run --release -p handeye_core --example inverse_kinematics -- GOALS
+//!     cargo run --release -p handeye_studies --example inverse_kinematics -- GOALS
 //!
 //! A goal is where the tip is with joint values drawn evenly from their ranges; the search begins at others, drawn alike.
 //! One line for each arm: goals reached to 1e-6 m and rad within the ranges, time of one goal in milliseconds (median, 99th

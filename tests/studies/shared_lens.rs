@@ -1,6 +1,6 @@
 //! Sessions of one camera by themselves and with a shared lens: errors against the truth, coverage, and how they agree.
 //!
-//!     cargo run --release -p handeye_core --example shared_lens -- 100 3 10
+//!     cargo run --release -p handeye_studies --example shared_lens -- 100 3 10
 //!
 //! draws so many groups of so many sessions of so many views each (eye in hand, corners 0.1 px, robot 0.1 mm and 0.02°, nine
 //! unknown lens parameters) through the whole path of `calibrate`, and prints Markdown. All sessions of a group have the same

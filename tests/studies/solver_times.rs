@@ -1,6 +1,6 @@
 //! Times our solvers on corners from a file, for `tests/bench/solvers.py`.
 //!
-//!     cargo run --release -p handeye_core --example solver_times -- FILE REPEATS
+//!     cargo run --release -p handeye_studies --example solver_times -- FILE REPEATS
 //!
 //! The first line of FILE is `width height columns rows square_m`, every other a view: `base_from_tip` as three metres
 //! and the quaternion `w x y z`, then `u v` of all corners. Prints one JSON object: the camera, its cost in squared

@@ -1,6 +1,6 @@
 //! Monte-Carlo study of small targets that are far away and little tilted, which have two poses in a view.
 //!
-//!     cargo run --release -p handeye_core --example two_poses -- SESSIONS
+//!     cargo run --release -p handeye_studies --example two_poses -- SESSIONS
 //!
 //! Prints Markdown: the table of `docs/maths/two_poses.md`. A session has 15 views of 4×3 corners, 15 mm apart, through
 //! 640×480 pixels with f = 581 px, 0.2 px of noise per axis, rolled by up to 60°, by a robot that repeats to 0.1 mm and

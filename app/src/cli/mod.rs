@@ -175,8 +175,7 @@ fn ended(result: Result<(), Failure>) -> ExitCode {
 /// Messages of level INFO and above to standard error, errors only with `--quiet`; `RUST_LOG` overrides. The libraries of
 /// Rerun (`re_…`) warn of things that users can do nothing about.
 fn start_logging(quiet: bool) {
-    let default =
-        if quiet { "error" } else { "warn,handeye_app=info,handeye_core=info,handeye_sim_link=info,re_=error" };
+    let default = if quiet { "error" } else { "warn,handeye=info,re_=error" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
     let is_coloured = std::io::stderr().is_terminal();
     tracing_subscriber::fmt()

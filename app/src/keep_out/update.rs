@@ -109,8 +109,7 @@ pub(crate) fn write(file: &Path, text: &str) -> io::Result<()> {
     if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)?;
     }
-    let head =
-        "# What the robot's arm keeps out of; docs/reference/surroundings.md lists the keys. Lengths are metres in the base.\n";
+    let head = "# What the robot's arm keeps out of; docs/reference/surroundings.md lists the keys. Lengths are metres in the base.\n";
     handeye_files::atomic_file::write(file, format!("{head}{text}").as_bytes())
 }
 

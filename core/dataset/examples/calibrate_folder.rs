@@ -1,10 +1,10 @@
 //! Calibrates a dataset folder whose corners are in a table, without OpenCV and without images.
 //!
 //! ```text
-//! cargo run --release -p handeye_core --no-default-features --example calibrate_folder -- FOLDER
+//! cargo run --release -p handeye_dataset --example calibrate_folder -- FOLDER
 //! ```
 //!
-//! In a program of your own, `handeye_core = { path = "…/core", default-features = false }` is all that it depends on.
+//! In a program of your own, `handeye_dataset` and `handeye_estimate` are all that it depends on.
 //!
 //! `dataset.toml` of the folder names the tables: `poses` under `[robot]` with the pose of the tip for each image, and
 //! `corners` under `[target]` with a row `image,column,row,u,v` for each corner that a detector found, pixel (0, 0) being

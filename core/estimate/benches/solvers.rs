@@ -1,4 +1,4 @@
-//! Speed of the solvers on simulated corners: `cargo bench -p handeye_core --bench solvers`.
+//! Speed of the solvers on simulated corners: `cargo bench -p handeye_estimate --bench solvers`.
 //!
 //! `docs/studies/benchmarks.md` has the comparison with other programs, which `tests/bench/solvers.py`
 //! makes.

@@ -74,7 +74,7 @@
 //! | [`verify`] | predictions for views outside the fit, depth cameras |
 //! | [`clock_offset`], [`resolution`], [`shared_lens`], [`placement`] | clocks of camera and robot, resolution of poses, several cameras of a kind, an arm by its joint values |
 //!
-//! Conventions are in `docs/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
+//! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
 //! cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
 
 mod bend;

@@ -24,7 +24,7 @@
 //! | [`depth`] | depth images; the plane of a target in them is in [`targets::depth_plane`] |
 //! | [`progress`] | cancelling long work, and how far it is |
 //!
-//! Frames, units, the origin of pixels and the order of tangent vectors: `docs/conventions.md`. Never depends on images, files,
+//! Frames, units, the origin of pixels and the order of tangent vectors: `docs/reference/conventions.md`. Never depends on images, files,
 //! OpenCV, threads or clocks.
 
 pub mod camera;

@@ -17,6 +17,7 @@
 //! assert_eq!((scene.render(1).dimensions(), scene.truth().len()), ((640, 480), 54));
 //! ```
 
+#[cfg(feature = "print")]
 mod drawn;
 mod exact;
 pub mod flat_board;

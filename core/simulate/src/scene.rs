@@ -6,6 +6,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 
+#[cfg(feature = "print")]
 use super::drawn::Drawn;
 use super::exact::Squares;
 use handeye_geometry::camera::Intrinsics;
@@ -37,6 +38,7 @@ pub struct Scene {
     pub covered: Option<[u32; 4]>,
     /// Whether the square between the first four corners of a chessboard is dark.
     pub first_dark: bool,
+    #[cfg(feature = "print")]
     drawn: Option<Drawn>,
 }
 
@@ -57,14 +59,16 @@ impl Scene {
             fall: 0.0,
             covered: None,
             first_dark: true,
+            #[cfg(feature = "print")]
             drawn: None,
         }
     }
 
-    /// A target of any kind as it is printed, with noise of one grey level.
+    /// A target of any kind as it is printed, with noise of one grey level. Feature `print`.
     ///
     /// # Panics
     /// When the target cannot be drawn.
+    #[cfg(feature = "print")]
     pub fn drawn(target: TargetSpec, camera: Intrinsics, camera_from_target: Isometry3<f64>) -> Self {
         let any = Grid { columns: 2, rows: 2, square_m: 1.0 };
         Self { target, noise: 1.0, drawn: Some(Drawn::of(&target)), ..Self::new(camera, any, camera_from_target) }
@@ -109,16 +113,22 @@ impl Scene {
         self.render_with(&mut ChaCha8Rng::seed_from_u64(seed))
     }
 
+    /// The light in every pixel before the lens blurs it.
+    fn levels(&self) -> Vec<f64> {
+        #[cfg(feature = "print")]
+        if let Some(drawn) = &self.drawn {
+            return drawn.levels(self, TABLE);
+        }
+        Squares::of(self).levels(self)
+    }
+
     /// The image with the noise that comes next.
     ///
     /// # Panics
     /// When the target is seen edge-on, or the lens model does not reach the edge of an exact image.
     pub fn render_with(&self, rng: &mut ChaCha8Rng) -> GrayImage {
         let (width, height) = (self.camera.width as usize, self.camera.height as usize);
-        let mut levels = match &self.drawn {
-            Some(drawn) => drawn.levels(self, TABLE),
-            None => Squares::of(self).levels(self),
-        };
+        let mut levels = self.levels();
         if self.fall != 0.0 {
             for (i, level) in levels.iter_mut().enumerate() {
                 *level *= 1.0 + self.fall * ((i % width) as f64 / width as f64 - 0.5);

@@ -1,7 +1,7 @@
 //! Tracks a board through the images of a dataset folder, with the calibration made from the same images.
 //!
 //! ```text
-//! cargo run --release -p handeye_core --example track_board -- FOLDER [SECONDS BETWEEN IMAGES]
+//! cargo run --release -p handeye_track --example track_board -- FOLDER [SECONDS BETWEEN IMAGES]
 //! ```
 //!
 //! Prints for each image whether the board is seen, where its first corner is in the robot's base, and the standard

@@ -1,6 +1,6 @@
 //! Chessboard detection on rendered boards and on the reference sets, beside OpenCV.
 //!
-//! `cargo run --release -p handeye_core --example corner_bench -- [VIEWS] [native] [PART …]`: VIEWS rendered boards per case,
+//! `cargo run --release -p handeye_studies --example corner_bench -- [VIEWS] [native] [PART …]`: VIEWS rendered boards per case,
 //! 24 unless told; with `native` without the detectors of OpenCV, which take most of the time. The parts are `rendered`,
 //! `hard`, `absent` and `recorded`; all of them unless told. The sets are looked for in `$HANDEYE_DATA`, then in
 //! `../shared/data`.

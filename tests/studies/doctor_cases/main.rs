@@ -1,6 +1,6 @@
 //! What the doctor says of constructed sessions: forty that are degenerate or hostile, healthy ones, and nine faults.
 //!
-//! `cargo run --release -p handeye_core --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
+//! `cargo run --release -p handeye_studies --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
 //! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
 //! sessions with an arm whose error depends on where it stands; one alone with its report; `… -- servo [SESSIONS] [FIRST]` for those
 //! of an arm of servo motors, and for a board that slipped in them; `… -- lenses [GROUPS] [FIRST]` for lenses that are said to differ

@@ -1,6 +1,6 @@
 //! What is said of a lens beside a robot, on sessions drawn by code that shares nothing with the estimator.
 //!
-//! `cargo run --release -p handeye_core --example lens_claims -- given [SESSIONS] [ROBOT]`: how often a given lens whose centre is off is
+//! `cargo run --release -p handeye_studies --example lens_claims -- given [SESSIONS] [ROBOT]`: how often a given lens whose centre is off is
 //! found, how often a right one is accused, and whether the stated error holds the true one. `… -- halves [SESSIONS] [KIND]`: the
 //! stated error of lens and hand-eye transform where the lens is estimated from half a session, and what it was without counting that
 //! views disagree about the lens.

@@ -1,6 +1,6 @@
 //! Monte-Carlo study of the joint estimator and of all closed forms against the Cramér–Rao bound.
 //!
-//!     cargo run --release -p handeye_core --example monte_carlo -- --trials 1500
+//!     cargo run --release -p handeye_studies --example monte_carlo -- --trials 1500
 //!
 //! The whole grid takes hours; every option narrows it, and what is printed is Markdown:
 //!

@@ -2,9 +2,9 @@
 //! answers of random halves, and the checks of the stated uncertainty.
 //!
 //! ```text
-//! cargo run --release -p handeye_core --example real_data -- folds 20
-//! cargo run --release -p handeye_core --example real_data -- halves 100
-//! cargo run --release -p handeye_core --example real_data -- checks
+//! cargo run --release -p handeye_studies --example real_data -- folds 20
+//! cargo run --release -p handeye_studies --example real_data -- halves 100
+//! cargo run --release -p handeye_studies --example real_data -- checks
 //! ```
 //!
 //! The number is that of random divisions; names of sets may follow. The data sets are looked for in `$HANDEYE_DATA`, then

@@ -1,4 +1,4 @@
-//! The crate `vision-calibration` on corners from files; see `core/studies/solver_times.rs` for the format.
+//! The crate `vision-calibration` on corners from files; see `tests/studies/solver_times.rs` for the format.
 //!
 //! ```text
 //! solver_peers FILE REPEATS                                        times the calibration of the camera
