@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_arm::JointValues;
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_dataset::CameraInput;
 use handeye_dataset::taught_poses::TaughtPose;
 use handeye_estimate::handeye::Mode;
@@ -18,7 +19,6 @@ use handeye_plan::Surroundings;
 use handeye_plan::surroundings::KeepOutFile;
 use handeye_print::Page;
 use handeye_session::CaptureId;
-use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
 use crate::by_hand::state::HandChoice;

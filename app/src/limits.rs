@@ -1,9 +1,9 @@
 //! How fast the arm moves when nobody says otherwise.
 
 use handeye_arm::JointKind;
+use handeye_coppeliasim::MotionLimits;
 use handeye_dataset::taught_poses;
 use handeye_plan::Pace;
-use handeye_sim_link::client::MotionLimits;
 
 /// Limits of the reference sequence: of every motion in the window, and of pose files without their own.
 pub const SEQUENCE: taught_poses::MotionLimits = taught_poses::MotionLimits {
@@ -54,7 +54,7 @@ fn pace_of_tip(limits: &taught_poses::MotionLimits, share: f64) -> Pace {
 
 #[cfg(test)]
 mod tests {
-    use handeye_sim_link::cell::motion::{self, JointMotion, MotionState, Sync};
+    use handeye_motion::{self as motion, JointMotion, MotionState, Sync};
 
     use super::*;
 

@@ -8,8 +8,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use directories::BaseDirs;
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_geometry::depth::ColourMap;
-use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
 

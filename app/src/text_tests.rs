@@ -116,7 +116,7 @@ fn what_an_error_misses_or_wants_is_there_in_chinese() {
     let mut missing = Vec::new();
     for (file, source) in all_sources() {
         let path = file.to_string_lossy().replace('\\', "/");
-        let is_said = ["/core/", "/sim_link/src/client/"].iter().any(|folder| path.contains(folder));
+        let is_said = ["/core/", "/sim_link/coppeliasim/src/"].iter().any(|folder| path.contains(folder));
         if !is_said || path.contains("tests") {
             continue;
         }
@@ -192,10 +192,10 @@ fn no_error_of_ours_is_passed_on_in_english() {
 
 #[test]
 fn an_error_within_errors_is_said_in_chinese_to_its_end() {
+    use handeye_driver::{DriverError, Ending};
     use handeye_estimate::CalibrateError;
     use handeye_estimate::intrinsics::IntrinsicsError;
     use handeye_geometry::camera::CameraError;
-    use handeye_sim_link::driver::{DriverError, Ending};
 
     let source = CameraError::BehindCamera { z_m: -1.0 };
     let error = CalibrateError::Intrinsics(IntrinsicsError::BadStart { source });

@@ -21,13 +21,13 @@ use handeye_app::model::{
     Axis, CapturePurpose, CellSource, Drivers, Jog, JogFrame, JogSettings, JogStep, Model, Motion, SolveStatus,
 };
 use handeye_app::rerun_log::RerunChoice;
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
+use handeye_driver::fake::{Fake, FakeOptions, FakePart};
 use handeye_geometry::frames::{Base, Camera, Pose, Tip};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint};
-use handeye_sim_link::driver::fake::{Fake, FakeOptions, FakePart};
+use handeye_server::{CellConfig, CellServer};
 use window::Drawn;
 
 /// Longest wait for anything that a person waits for.

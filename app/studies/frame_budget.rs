@@ -24,14 +24,14 @@ use handeye_app::model::{CellSource, MotionGoal, Observed, SessionState, ViewerS
 use handeye_app::rerun_log::RerunChoice;
 use handeye_app::session::start::{self, BOARD};
 use handeye_app::text::Text;
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::ConnectionOptions;
+use handeye_coppeliasim::cell::{CellClient, CellPaths};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::observation::Corner;
+use handeye_server::{CellConfig, CellServer};
 use handeye_session::{CaptureId, CaptureRecord, Document};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::ConnectionOptions;
-use handeye_sim_link::client::cell::{CellClient, CellPaths};
 use image::RgbImage;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
 use window::Drawn;

@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use handeye_sim_link::client::cell::{Arm, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_coppeliasim::cell::{Arm, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::http::HeaderValue;

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use ciborium::Value;
-use handeye_sim_link::client::{Connection, ConnectionOptions, Endpoint};
-use handeye_sim_link::wire::{self, Reader as _};
+use handeye_coppeliasim::{Connection, ConnectionOptions, Endpoint};
+use handeye_wire::{self as wire, Reader as _};
 
 use crate::CellProcess;
 

@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 
 use ciborium::Value;
-use handeye_sim_link::wire;
+use handeye_wire as wire;
 
 /// A request of the remote API.
 pub fn request(uuid: &str, func: &str, args: Vec<Value>) -> Vec<u8> {

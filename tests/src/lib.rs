@@ -14,7 +14,7 @@ use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use handeye_sim_link::cell::scene::Scene;
+use handeye_cell::scene::Scene;
 
 /// Root of the workspace.
 pub fn workspace_root() -> &'static Path {

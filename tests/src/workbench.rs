@@ -10,7 +10,7 @@ use handeye_app::model::{CellSource, Model, ViewSettings};
 use handeye_app::rerun_log::RerunChoice;
 use handeye_app::text::Language;
 use handeye_app::worker::{Clock, Waker};
-use handeye_sim_link::client::cell::CellPaths;
+use handeye_coppeliasim::cell::CellPaths;
 
 /// Longer than anything that a test waits for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(6);

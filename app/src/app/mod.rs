@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_files::bounds::Bounds;
-use handeye_sim_link::client::cell::CellPaths;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};

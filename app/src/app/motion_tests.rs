@@ -1,7 +1,7 @@
 //! What moves the arm, and what has to be asked first.
 
+use handeye_cell::scene::{SceneChoice, ShippedScene};
 use handeye_dataset::taught_poses::{Goal, TaughtPose};
-use handeye_sim_link::cell::scene::{SceneChoice, ShippedScene};
 
 use super::tests::{bench, said};
 use super::*;

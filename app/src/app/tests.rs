@@ -21,8 +21,8 @@ use crate::model::{
 };
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
-use handeye_sim_link::cell::scene::{SceneChoice, ShippedScene};
-use handeye_sim_link::client::cell::ArmKinematics;
+use handeye_cell::scene::{SceneChoice, ShippedScene};
+use handeye_coppeliasim::cell::ArmKinematics;
 
 pub(super) struct Bench {
     pub app: App,

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use handeye_arm::urdf::Urdf;
 use handeye_arm::{Arm, ArmKind, JointRange, JointValues};
+use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_estimate::placement::{JointView, place};
 use handeye_geometry::frames::Pose;
-use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::Failure;
 

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use clap::Args;
-use handeye_sim_link::cell::scene::{BoardPath, Scene, SceneChoice};
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
+use handeye_cell::scene::{BoardPath, Scene, SceneChoice};
+use handeye_server::{CellConfig, CellServer};
 
 use super::{Failure, heading, out, solve};
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use handeye_capture::NO_IMAGES_S;
-use handeye_sim_link::client::LinkError;
+use handeye_coppeliasim::LinkError;
 
 /// Images that cannot be had whole: on a machine under load the simulation moves on while one is read. Said once, and waited
 /// for as long as a capture waits.

@@ -1,7 +1,7 @@
 //! `--object`: where a scene has the parts of the cell.
 
 use clap::Args;
-use handeye_sim_link::client::cell::{BadCellPath, CellPaths};
+use handeye_coppeliasim::cell::{BadCellPath, CellPaths};
 
 use super::heading;
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use handeye_coppeliasim::LinkError;
+use handeye_coppeliasim::cell::{Arm, CellInfo, Frame, GroundTruth};
 use handeye_session::Store;
-use handeye_sim_link::client::LinkError;
-use handeye_sim_link::client::cell::{Arm, CellInfo, Frame, GroundTruth};
 use image::RgbImage;
 
 use crate::model::{CellFacts, ColouredDepth, FrameImages, FrameInfo, LiveFrame};

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use handeye_arm::JointValues;
+use handeye_coppeliasim::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 use handeye_dataset::taught_poses::TaughtPoses;
 use handeye_geometry::frames::{Base, Pose, Target};
 use handeye_plan::Surroundings;
-use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 
 use super::Failure;
 use crate::session::start::{BOARD, REFERENCE_POSES};

@@ -11,7 +11,7 @@ pub(crate) mod worker;
 
 use std::sync::Arc;
 
-use handeye_sim_link::client::cell::CellPaths;
+use handeye_coppeliasim::cell::CellPaths;
 
 use crate::model::CellSource;
 use crate::text;

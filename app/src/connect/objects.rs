@@ -1,7 +1,7 @@
 //! Where the scene has the parts of the cell.
 
 use egui::{CollapsingHeader, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
-use handeye_sim_link::client::cell::{BadCellPath, CellPart, CellPaths};
+use handeye_coppeliasim::cell::{BadCellPath, CellPart, CellPaths};
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::theme::Palette;

@@ -2,7 +2,7 @@
 
 use egui::text::LayoutJob;
 use egui::{Align, Button, ComboBox, FontSelection, Id, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
-use handeye_sim_link::client::{BadEndpoint, Endpoint};
+use handeye_coppeliasim::{BadEndpoint, Endpoint};
 
 use super::{drivers, objects, scene};
 use crate::command::{Command, Outbox};

@@ -1,7 +1,7 @@
 //! Which scene the built-in cell has.
 
 use egui::{ComboBox, Ui, WidgetInfo, WidgetType};
-use handeye_sim_link::cell::scene::{SceneChoice, ShippedScene};
+use handeye_cell::scene::{SceneChoice, ShippedScene};
 
 use crate::gui::style::form;
 use crate::model::{CellSource, Model};

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::thread::Builder;
 
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::cell::CellPaths;
 
 use crate::app::App;
 use crate::connect::server_name;

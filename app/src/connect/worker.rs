@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use handeye_coppeliasim::CancelToken;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::CancelToken;
 
 use super::stop_line::StopLine;
 use crate::command::Event;

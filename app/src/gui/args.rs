@@ -1,7 +1,7 @@
 //! `handeye gui`, as the command line has it.
 
 use clap::Args;
-use handeye_sim_link::cell::scene::SceneChoice;
+use handeye_cell::scene::SceneChoice;
 
 use crate::cli::{ObjectArgs, RerunArg, heading};
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_plan::Surroundings;
-use handeye_sim_link::client::cell::CellPaths;
 
 use super::shell::layout::Layout;
 use super::waker::waker_of;

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use handeye_coppeliasim::CancelToken;
 use handeye_geometry::depth::ColourMap;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::CancelToken;
 
 use crate::live::depth;
 use crate::model::{ColouredDepth, DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};

@@ -11,6 +11,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_arm::{JointKind, JointValues};
+use handeye_cell::scene::SceneChoice;
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_estimate::Method;
 use handeye_estimate::handeye::HandEye;
 use handeye_estimate::verify::Predictor;
@@ -20,8 +22,6 @@ use handeye_geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_plan::guided::GuidedOptions;
 use handeye_plan::guided::choose::Proposal;
 use handeye_session::{CaptureId, Document};
-use handeye_sim_link::cell::scene::SceneChoice;
-use handeye_sim_link::client::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
 pub use crate::by_hand::state::ByHand;
@@ -50,7 +50,7 @@ pub use crate::track::state::{
     BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
 };
 pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
-pub use handeye_sim_link::client::cell::BoardPath;
+pub use handeye_coppeliasim::cell::BoardPath;
 pub use workflow::{Dialog, Pane, Step};
 
 use crate::keep_out::state::KeepOut;

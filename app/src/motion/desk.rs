@@ -4,8 +4,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use handeye_coppeliasim::CancelToken;
 use handeye_plan::Surroundings;
-use handeye_sim_link::client::CancelToken;
 
 use super::grip::{Grip, SILENCE};
 use super::jog_line::{Held, JogLine};

@@ -1,13 +1,13 @@
 //! The arm of a cell over the remote API, as the motion worker drives it.
 
 use handeye_arm::JointValues;
-use handeye_plan::guided::choose::Robot;
-use handeye_plan::{Contact, PlanError, Surroundings};
-use handeye_sim_link::client::cell::{
+use handeye_coppeliasim::cell::{
     Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd,
     JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
 };
-use handeye_sim_link::client::{CancelToken, LinkError, SimulationState};
+use handeye_coppeliasim::{CancelToken, LinkError, SimulationState};
+use handeye_plan::guided::choose::Robot;
+use handeye_plan::{Contact, PlanError, Surroundings};
 use nalgebra::Vector3;
 
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};

@@ -1,7 +1,7 @@
 //! What the states say of an arm that was stopped.
 
 use handeye_arm::JointKind;
-use handeye_sim_link::driver::{Moved, Place, RestWatch};
+use handeye_driver::{Moved, Place, RestWatch};
 
 use crate::app::App;
 use crate::model::{Moves, RobotState, Severity, Simulation};

@@ -1,9 +1,9 @@
 //! What the arm does and is asked to do.
 
 use handeye_arm::{JointKind, JointValues};
+use handeye_coppeliasim::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_sim_link::client::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth};
 use serde::{Deserialize, Serialize};
 
 use crate::text::Text;

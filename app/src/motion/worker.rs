@@ -4,9 +4,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::{FollowMoment, FollowWish as ArmWish};
 use handeye_plan::guided::choose::Robot;
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{FollowMoment, FollowWish as ArmWish};
 
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;

@@ -59,7 +59,7 @@ fn cell(model: &Model, shift_m: f64) -> Entry {
     let mut facts = model.cell.clone().expect("connected");
     let arm = facts.arm.take().expect("it has an arm");
     let elsewhere = nalgebra::Isometry3::translation(shift_m, 0.0, 0.0) * arm.base_from_arm();
-    facts.arm = Some(handeye_sim_link::client::cell::ArmKinematics::new(arm.arm().clone(), elsewhere));
+    facts.arm = Some(handeye_coppeliasim::cell::ArmKinematics::new(arm.arm().clone(), elsewhere));
     facts.truth = None;
     Entry::Cell(Arc::new(facts))
 }

@@ -3,10 +3,10 @@
 use std::sync::LazyLock;
 
 use handeye_arm::ArmKind;
+use handeye_cell::render::{Solid, props};
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::cell::render::{Solid, props};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::cell::ArmKinematics;
 use nalgebra::Isometry3;
 
 use crate::model::CellFacts;
@@ -52,7 +52,7 @@ pub fn posed_arm(cell: Option<&CellFacts>, base_from_tip: &Pose<Base, Tip>, join
 #[cfg(test)]
 mod tests {
     use handeye_arm::JointValues;
-    use handeye_sim_link::cell::render::Shape;
+    use handeye_cell::render::Shape;
     use nalgebra::{Point3, Translation3};
 
     use super::*;

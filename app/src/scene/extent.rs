@@ -1,7 +1,7 @@
 //! How much room arm, cameras, boards and captures take, for whoever looks at all of them.
 
+use handeye_cell::render::Shape;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::cell::render::Shape;
 use nalgebra::{Point3, Vector3};
 
 use super::{Known, PosedArm, frustum_end, outline};

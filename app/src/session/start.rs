@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use handeye_arm::{ArmKind, ArmModel, JointKind};
+use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_session::{GroundTruth, SessionMeta};
-use handeye_sim_link::client::cell::ArmKinematics;
 
 use crate::model::Truth;
 

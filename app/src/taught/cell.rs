@@ -1,10 +1,10 @@
 //! Which taught poses belong to the cell that is connected.
 
 use handeye_arm::JointValues;
+use handeye_cell::scene::SceneChoice;
+use handeye_coppeliasim::cell::{ArmKinematics, CellPart};
 use handeye_dataset::taught_poses::{TaughtJoint, TaughtOn, TaughtPose};
 use handeye_geometry::targets::TargetSpec;
-use handeye_sim_link::cell::scene::SceneChoice;
-use handeye_sim_link::client::cell::{ArmKinematics, CellPart};
 
 use crate::model::{CellSource, Model, Moves};
 

@@ -1,8 +1,8 @@
 //! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
 
 use handeye_arm::JointValues;
+use handeye_coppeliasim::cell::BoardInView;
 use handeye_estimate::handeye::HandEye;
-use handeye_sim_link::client::cell::BoardInView;
 
 use crate::app::App;
 use crate::model::{

@@ -3,9 +3,9 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use handeye_coppeliasim::cell::{BoardInView, FollowGoal, FollowMoment, FollowWish as ArmWish};
 use handeye_estimate::handeye::HandEye;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::cell::{BoardInView, FollowGoal, FollowMoment, FollowWish as ArmWish};
 use handeye_track::{Estimate, Keep, Rest, Setup, State, TipGoal, Update};
 
 use crate::model::{FollowStatus, FollowWish};

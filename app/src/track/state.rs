@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use handeye_coppeliasim::cell::BoardPath;
 use handeye_geometry::frames::{Base, Camera, Pose, Target};
-use handeye_sim_link::client::cell::BoardPath;
 use handeye_track::Update;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! What an error of the client means for a connection.
 
-use handeye_sim_link::client::cell::Arm;
-use handeye_sim_link::client::{Connection, LinkError};
+use handeye_coppeliasim::cell::Arm;
+use handeye_coppeliasim::{Connection, LinkError};
 
 use crate::text;
 use crate::text::Text;

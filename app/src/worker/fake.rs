@@ -4,13 +4,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 use handeye_arm::{ArmKind, JointKind, JointValues};
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::Pose;
 use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::Robot;
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
 use image::{Rgb, RgbImage};
 use nalgebra::Isometry3;
 

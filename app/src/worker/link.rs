@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError};
-use handeye_sim_link::client::CancelToken;
+use handeye_coppeliasim::CancelToken;
 
 use super::port::{Connected, Connector, PortError};
 use super::reconnect::Reconnect;

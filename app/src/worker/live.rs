@@ -2,10 +2,10 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use handeye_sim_link::cell::scene::SceneChoice;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
-use handeye_sim_link::client::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, SimulationState};
+use handeye_cell::scene::SceneChoice;
+use handeye_coppeliasim::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
+use handeye_coppeliasim::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, SimulationState};
+use handeye_server::{CellConfig, CellServer};
 
 use super::cell_error::{check, check_arm, port_error};
 use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, Newest, PortError, RawFrame};

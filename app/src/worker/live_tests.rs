@@ -4,14 +4,14 @@ use std::path::Path;
 use std::thread::JoinHandle;
 
 use handeye_arm::{JointKind, JointValues};
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::cell::{Arm, CellPaths};
+use handeye_coppeliasim::{CallOptions, ConnectionOptions, Endpoint, Sim, SimulationState};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_geometry::frames::Base;
 use handeye_plan::Obstacle;
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CellPaths};
-use handeye_sim_link::client::{CallOptions, ConnectionOptions, Endpoint, Sim, SimulationState};
-use handeye_sim_link::wire;
+use handeye_server::{CellConfig, CellServer};
+use handeye_wire as wire;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::fake::FakeCell;

@@ -33,9 +33,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
+use handeye_coppeliasim::CancelToken;
 use handeye_geometry::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_plan::Surroundings;
-use handeye_sim_link::client::CancelToken;
 
 pub use crate::connect::stop_line::StopLine;
 pub use crate::connect::worker::ControlTask;

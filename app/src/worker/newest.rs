@@ -4,7 +4,7 @@ use std::io;
 use std::sync::Arc;
 
 use crossbeam_channel::{Sender, TrySendError, bounded};
-use handeye_sim_link::client::CancelToken;
+use handeye_coppeliasim::CancelToken;
 
 use super::slot::LatestSlot;
 use super::started::Started;

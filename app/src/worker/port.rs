@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use handeye_arm::JointValues;
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::{BoardInView, FollowMoment, FollowWish};
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::Robot;
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{BoardInView, FollowMoment, FollowWish};
 use image::RgbImage;
 
 use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState, Severity};

@@ -12,7 +12,7 @@ use handeye_app::model::{CellSource, ViewSettings};
 use handeye_app::rerun_log::RerunChoice;
 use handeye_app::settings::SettingsFile;
 use handeye_app::worker::{Clock, Waker};
-use handeye_sim_link::client::cell::CellPaths;
+use handeye_coppeliasim::cell::CellPaths;
 
 /// Refresh of a usual screen.
 const PERIOD: Duration = Duration::from_micros(16_667);

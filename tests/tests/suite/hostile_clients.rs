@@ -6,8 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use ciborium::Value;
-use handeye_sim_link::client::cell::{Arm, CameraFeed, CellClient, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_coppeliasim::cell::{Arm, CameraFeed, CellClient, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use handeye_tests::{CellProcess, handeye_binary, hostile};
 
 /// Longer than anything here takes on a busy machine.

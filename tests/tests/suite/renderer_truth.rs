@@ -1,10 +1,10 @@
 //! Images of the cell against the analytic projection of what is in them, with the detector that users have.
 
+use handeye_cell::render::{BoardSurface, Imaging, Light, RenderScene, Renderer};
 use handeye_detect as detect;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_images::gray_from_rgb;
-use handeye_sim_link::cell::render::{BoardSurface, Imaging, Light, RenderScene, Renderer};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

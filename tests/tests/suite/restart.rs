@@ -3,8 +3,8 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use handeye_sim_link::client::cell::{Arm, CameraFeed, CellClient, CellPaths};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};
+use handeye_coppeliasim::cell::{Arm, CameraFeed, CellClient, CellPaths};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};
 use handeye_tests::CellProcess;
 
 /// What a user is promised: a dead cell is reported within this.

@@ -8,9 +8,9 @@ use std::process::{Command, Output};
 
 use ciborium::Value;
 use handeye_geometry::testing::python;
-use handeye_sim_link::wire::Reader as _;
 use handeye_tests::coppeliasim::{Call, StandIn};
 use handeye_tests::{CellProcess, workspace_root};
+use handeye_wire::Reader as _;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// What it makes, and the arm, which it loads.

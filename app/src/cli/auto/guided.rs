@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_dataset::taught_poses::Goal;
 use handeye_estimate::diagnose::{Calibration, calibrate};
 use handeye_estimate::{Method, Observations};
@@ -11,7 +12,6 @@ use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::{Proposal, Robot};
 use handeye_plan::guided::{Ending, Guide, Known, Next};
 use handeye_session::CaptureId;
-use handeye_sim_link::client::cell::ArmKinematics;
 
 use super::super::Failure;
 use super::super::towards_board::TowardsBoard;

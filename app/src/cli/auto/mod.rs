@@ -8,16 +8,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use handeye_coppeliasim::cell::{Arm, ArmKinematics, CellClient, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint, SimulationState};
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_estimate::{Method, Options};
 use handeye_plan::Surroundings;
 use handeye_plan::guided::{CHECKS, Guide, GuidedOptions};
 use handeye_result::guided_record::GUIDED_RECORD;
+use handeye_server::{CellConfig, CellServer};
 use handeye_session::guided::guided_record;
 use handeye_session::{FolderLock, Session, SessionMeta, Store};
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, ArmKinematics, CellClient, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint, SimulationState};
 
 use super::cell::SceneArg;
 use super::output::Output;

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use handeye_arm::JointValues;
+use handeye_cell::scene::{ResolvedScene, Scene};
+use handeye_coppeliasim::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 use handeye_dataset::taught_poses::{Goal, MotionLimits, TaughtPoses};
 use handeye_plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
-use handeye_sim_link::cell::scene::{ResolvedScene, Scene};
-use handeye_sim_link::client::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 
 use super::super::{Failure, towards_board};
 use crate::limits;

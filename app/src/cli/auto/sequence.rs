@@ -3,11 +3,11 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
+use handeye_coppeliasim::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
+use handeye_coppeliasim::{CallOptions, LinkError, SimulationState};
 use handeye_dataset::taught_poses::Goal;
 use handeye_geometry::progress::CancelToken;
 use handeye_session::{CaptureId, Store};
-use handeye_sim_link::client::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{CallOptions, LinkError, SimulationState};
 
 use super::super::late::Late;
 use super::super::{Failure, record};

@@ -4,8 +4,8 @@ use std::io::BufReader;
 use std::net::TcpListener;
 
 use clap::{Args, ValueEnum};
-use handeye_sim_link::client::Endpoint;
-use handeye_sim_link::driver::fake::{Fake, FakeError, FakeOptions, FakePart};
+use handeye_coppeliasim::Endpoint;
+use handeye_driver::fake::{Fake, FakeError, FakeOptions, FakePart};
 
 use crate::cli::cell::SceneArg;
 use crate::cli::{Failure, heading, out};

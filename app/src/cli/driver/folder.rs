@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use handeye_dataset::PoseFormat;
-use handeye_sim_link::drivers::folder::{Folder, FolderOptions};
+use handeye_driver::drivers::folder::{Folder, FolderOptions};
 
 use super::{serve, size};
 use crate::cli::{Failure, heading};

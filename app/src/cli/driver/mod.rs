@@ -9,7 +9,7 @@ mod ur_rtde;
 mod v4l;
 
 use clap::{Args, Subcommand};
-use handeye_sim_link::drivers::{self, Device};
+use handeye_driver::drivers::{self, Device};
 
 use super::Failure;
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use handeye_arm::urdf::Urdf;
 use handeye_arm::{Joint, JointKind};
-use handeye_sim_link::driver::message::{ArmMessage, JointMessage};
-use handeye_sim_link::drivers::rosbridge::{Rosbridge, RosbridgeOptions};
+use handeye_driver::drivers::rosbridge::{Rosbridge, RosbridgeOptions};
+use handeye_driver::message::{ArmMessage, JointMessage};
 
 use super::serve;
 use crate::cli::{Failure, heading};

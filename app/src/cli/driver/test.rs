@@ -1,8 +1,8 @@
 //! `handeye driver test`: what a driver's author has to know.
 
 use clap::Args;
-use handeye_sim_link::driver::conformance::{self, ConformanceOptions};
-use handeye_sim_link::driver::{BadSpec, DriverSpec};
+use handeye_driver::conformance::{self, ConformanceOptions};
+use handeye_driver::{BadSpec, DriverSpec};
 
 use crate::cli::output::Output;
 use crate::cli::{Failure, heading, out, solve};

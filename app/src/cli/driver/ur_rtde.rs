@@ -2,8 +2,8 @@
 
 use clap::Args;
 use handeye_arm::ArmKind;
-use handeye_sim_link::driver::message::ArmMessage;
-use handeye_sim_link::drivers::ur_rtde::{PORT, RtdeOptions, UrRtde, UrRtdeOptions};
+use handeye_driver::drivers::ur_rtde::{PORT, RtdeOptions, UrRtde, UrRtdeOptions};
+use handeye_driver::message::ArmMessage;
 
 use super::serve;
 use crate::cli::{Failure, heading};

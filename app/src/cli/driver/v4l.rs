@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_sim_link::drivers::v4l::{PixelFormat, V4l, V4lOptions};
+use handeye_driver::drivers::v4l::{PixelFormat, V4l, V4lOptions};
 
 use super::{serve, size};
 use crate::cli::{Failure, heading};

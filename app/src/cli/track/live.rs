@@ -5,16 +5,16 @@ use std::sync::Arc;
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
+use handeye_coppeliasim::cell::{
+    Among, Arm, ArmKinematics, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment,
+    FollowWish as ArmWish, MotionTolerance, SettleOptions, Standing,
+};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median_high;
 use handeye_images::gray_from_rgb;
-use handeye_sim_link::client::cell::{
-    Among, Arm, ArmKinematics, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment,
-    FollowWish as ArmWish, MotionTolerance, SettleOptions, Standing,
-};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use handeye_track::{Estimate, Image, Keep, Setup, State};
 use serde_json::{Value, json};
 

@@ -7,10 +7,10 @@ mod live;
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::Endpoint;
-use handeye_sim_link::client::cell::CellPaths;
-use handeye_sim_link::client::cell::{BoardMotion, BoardPath};
+use handeye_coppeliasim::Endpoint;
+use handeye_coppeliasim::cell::CellPaths;
+use handeye_coppeliasim::cell::{BoardMotion, BoardPath};
+use handeye_server::{CellConfig, CellServer};
 use handeye_track::{MotionModel, Setup};
 
 use super::cell::SceneArg;

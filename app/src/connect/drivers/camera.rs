@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use handeye_arm::JointValues;
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::driver::message::Ability;
-use handeye_sim_link::driver::{DriverCell, NoPose, limits};
+use handeye_coppeliasim::CancelToken;
+use handeye_driver::message::Ability;
+use handeye_driver::{DriverCell, NoPose, limits};
 
 use super::{TypedPose, port_error};
 use crate::text;

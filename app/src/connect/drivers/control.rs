@@ -1,10 +1,10 @@
 //! The robot behind a driver: where it is, whether it may be moved, stop.
 
 use handeye_arm::JointValues;
+use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_driver::message::Ability;
+use handeye_driver::{ChainPlacement, Driver, DriverCell, LogLevel};
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::cell::ArmKinematics;
-use handeye_sim_link::driver::message::Ability;
-use handeye_sim_link::driver::{ChainPlacement, Driver, DriverCell, LogLevel};
 
 use super::{TypedPose, port_error};
 use crate::model::{ArmDoubt, BoardMotion, CellFacts, JointFacts, Moves, RobotState, Severity, Simulation};

@@ -1,4 +1,4 @@
-//! A robot and a camera behind [drivers](handeye_sim_link::driver), as the workers use them.
+//! A robot and a camera behind [drivers](handeye_driver), as the workers use them.
 
 mod camera;
 mod control;
@@ -11,9 +11,9 @@ pub(crate) mod typed_pose;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use handeye_coppeliasim::CancelToken;
+use handeye_driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions, NoCell};
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions, NoCell};
 
 use crate::model::Drivers;
 use crate::text;
@@ -49,7 +49,7 @@ impl DriverConnector {
     }
 
     fn connected<Port>(&self, port: Port, cell: &DriverCell) -> Connected<Port> {
-        let named = |driver: &handeye_sim_link::driver::Driver| {
+        let named = |driver: &handeye_driver::Driver| {
             let hello = driver.hello();
             format!("{} {}", hello.name, hello.version).trim_end().to_owned()
         };

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use handeye_arm::JointValues;
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
+use handeye_driver::message::Ability;
+use handeye_driver::{ChainPlacement, Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_plan::guided::choose::Robot;
 use handeye_plan::{Contact, Surroundings};
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
-use handeye_sim_link::driver::message::Ability;
-use handeye_sim_link::driver::{ChainPlacement, Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::port_error;

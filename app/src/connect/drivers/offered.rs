@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use handeye_arm::ArmKind;
-use handeye_sim_link::cell::scene::ShippedScene;
-use handeye_sim_link::driver::DriverSpec;
+use handeye_cell::scene::ShippedScene;
+use handeye_driver::DriverSpec;
 
 use crate::text::Language;
 use crate::tr;

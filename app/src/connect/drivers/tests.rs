@@ -5,13 +5,13 @@ use std::net::TcpListener;
 use std::sync::Arc;
 use std::thread;
 
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_driver::fake::{Fake, FakeOptions, FakePart};
+use handeye_driver::message::Ability;
 use handeye_geometry::frames::Pose;
 use handeye_plan::{Obstacle, Surroundings};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::client::cell::ArmKinematics;
-use handeye_sim_link::driver::fake::{Fake, FakeOptions, FakePart};
-use handeye_sim_link::driver::message::Ability;
 
 use super::*;
 use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome, Moves, RobotState};

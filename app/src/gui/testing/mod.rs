@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use egui::{Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, HarnessBuilder};
+use handeye_coppeliasim::cell::CellPaths;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::Pose;
-use handeye_sim_link::client::cell::CellPaths;
 use image::{Rgb, RgbImage};
 
 use super::shell::layout::Layout;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_arm::{ArmKind, JointKind, JointValues};
+use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::{self, Finding, FindingOptions};
 use handeye_estimate::handeye::screening::Distance;
@@ -18,7 +19,6 @@ use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::{Corner, Corners, View};
 use handeye_session::{CaptureId, CaptureRecord, Document, Role};
-use handeye_sim_link::client::cell::ArmKinematics;
 use handeye_track::{BoardDetection, ByDepth, Estimate, State, Update};
 use image::{Rgb, RgbImage};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};

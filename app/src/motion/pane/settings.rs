@@ -1,7 +1,7 @@
 //! How the tip is jogged: whose axes, how far, how fast.
 
 use egui::{Button, RichText, Slider, Ui, WidgetInfo, WidgetType};
-use handeye_sim_link::client::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_TURN_SPEED_RAD_S};
+use handeye_coppeliasim::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_TURN_SPEED_RAD_S};
 
 use crate::command::{Command, Outbox};
 use crate::gui::style::parts;

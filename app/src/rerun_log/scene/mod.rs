@@ -34,10 +34,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_arm::{JointKind, JointValues};
+use handeye_cell::render::Solid;
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_session::{CaptureId, Document};
-use handeye_sim_link::cell::render::Solid;
 use rerun::{RecordingStream, TextLog, TextLogLevel};
 
 pub use error::RecordError;

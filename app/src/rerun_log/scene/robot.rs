@@ -1,7 +1,7 @@
 //! The arm, its joints, and the way that the tip went.
 
 use handeye_arm::JointKind;
-use handeye_sim_link::cell::render::{Shape, Solid};
+use handeye_cell::render::{Shape, Solid};
 use nalgebra::Vector3;
 use rerun::{Capsules3D, Color, Cylinders3D, FillMode, LineStrips3D, Radius, Scalars, SeriesLines};
 

@@ -1,7 +1,7 @@
 //! The bodies of the arm.
 
 use egui::Color32;
-use handeye_sim_link::cell::render::{Shape, props};
+use handeye_cell::render::{Shape, props};
 use nalgebra::Point3;
 
 use super::canvas::{Canvas, Cylinder};

@@ -4,14 +4,14 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded, select};
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::cell::{CellClient, CellPaths, GroundTruth};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::{Base, Pose, Target, Tip};
 use handeye_geometry::targets::observation::{Corner, Corners};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{CellClient, CellPaths, GroundTruth};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions};
+use handeye_server::{CellConfig, CellServer};
 use image::RgbImage;
 
 use super::super::{Clock, Connector, LiveConnector, Waker, Workers};

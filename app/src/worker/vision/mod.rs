@@ -11,10 +11,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, SendTimeoutError, Sender, TryRecvError, never, select};
+use handeye_coppeliasim::CancelToken;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::TargetSpec;
 use handeye_images::gray_from_rgb;
-use handeye_sim_link::client::CancelToken;
 use handeye_track::{Image, Setup};
 use image::GrayImage;
 

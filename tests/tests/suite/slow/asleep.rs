@@ -5,12 +5,12 @@ use std::path::Path;
 use std::process::{Child, ChildStderr};
 use std::time::{Duration, Instant};
 
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::ConnectionOptions;
+use handeye_coppeliasim::cell::{Arm, CellPaths};
 use handeye_result::CalibrationResult;
+use handeye_server::{CellConfig, CellServer};
 use handeye_session::Session;
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::ConnectionOptions;
-use handeye_sim_link::client::cell::{Arm, CellPaths};
 use handeye_tests::process::{end_of, put_to_sleep, signal, start, until_said};
 
 /// Longer than anything that is waited for takes on a busy machine.

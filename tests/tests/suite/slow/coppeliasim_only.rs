@@ -4,12 +4,12 @@
 use std::path::Path;
 use std::process::Command;
 
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::cell::{Arm, CellPaths, MotionTolerance};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_result::CalibrationResult;
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, LinkError, MotionLimits};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 use nalgebra::Vector3;
 use serde_json::Value;

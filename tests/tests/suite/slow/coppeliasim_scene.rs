@@ -3,9 +3,9 @@
 
 use std::process::{Command, Output};
 
+use handeye_coppeliasim::cell::{CellClient, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use handeye_geometry::targets::{Grid, TargetSpec};
-use handeye_sim_link::client::cell::{CellClient, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 use serde_json::Value;
 

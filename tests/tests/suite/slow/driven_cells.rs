@@ -6,13 +6,13 @@ use std::process::Command as Program;
 use handeye_app::command::Command;
 use handeye_app::limits;
 use handeye_app::model::{CapturePurpose, CellSource, Drivers, JogSettings, LinkState, Model, Motion, SolveStatus};
+use handeye_cell::scene::{Scene, ShippedScene};
+use handeye_coppeliasim::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_geometry::frames::{Camera, Pose, Tip};
 use handeye_plan::guided::CHECKS;
-use handeye_sim_link::cell::scene::{Scene, ShippedScene};
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint};
+use handeye_server::{CellConfig, CellServer};
 use handeye_tests::handeye_binary;
 use handeye_tests::workbench::Workbench;
 

@@ -4,12 +4,12 @@ use std::process::Command as Process;
 
 use handeye_app::command::Command;
 use handeye_app::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
+use handeye_cell::scene::{BoardMotionSpec, Scene};
+use handeye_coppeliasim::cell::FollowLimits;
+use handeye_coppeliasim::{CallOptions, ConnectionOptions, Sim};
 use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_server::{CellConfig, CellServer};
 use handeye_session::CaptureId;
-use handeye_sim_link::cell::scene::{BoardMotionSpec, Scene};
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::cell::FollowLimits;
-use handeye_sim_link::client::{CallOptions, ConnectionOptions, Sim};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, workspace_root};
 use handeye_track::State;

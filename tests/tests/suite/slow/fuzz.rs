@@ -5,10 +5,10 @@
 use std::time::Duration;
 
 use ciborium::Value;
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint, Sim};
-use handeye_sim_link::wire;
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::{ConnectionOptions, Endpoint, Sim};
+use handeye_server::{CellConfig, CellServer};
+use handeye_wire as wire;
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use handeye_sim_link::client::CancelToken;
-use handeye_sim_link::driver::{DriverCell, DriverCellSpec, DriverOptions};
-use handeye_sim_link::testing::{RosScene, RosVersion, RosbridgeServer, RtdeRobot, RtdeScript};
+use handeye_coppeliasim::CancelToken;
+use handeye_driver::testing::{RosScene, RosVersion, RosbridgeServer, RtdeRobot, RtdeScript};
+use handeye_driver::{DriverCell, DriverCellSpec, DriverOptions};
 use handeye_tests::handeye_binary;
 use image::RgbImage;
 use serde_json::Value;

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use handeye_app::command::Command;
 use handeye_app::model::CellSource;
+use handeye_coppeliasim::cell::{CellClient, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use handeye_estimate::handeye::HandEye;
 use handeye_geometry::se3;
 use handeye_result::{CalibrationResult, TransformEstimate};
-use handeye_sim_link::client::cell::{CellClient, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{CellProcess, workspace_root};
 use image::codecs::jpeg::JpegEncoder;

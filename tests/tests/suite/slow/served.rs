@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use handeye_sim_link::client::cell::{Arm, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_coppeliasim::cell::{Arm, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::network::{Network, Quality};
 use handeye_tests::{CellProcess, hurried};

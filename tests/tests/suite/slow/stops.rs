@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use handeye_arm::JointValues;
-use handeye_sim_link::client::cell::{Arm, CellPaths, JOG_JOINT_SPEED_RAD_S};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
+use handeye_coppeliasim::cell::{Arm, CellPaths, JOG_JOINT_SPEED_RAD_S};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
 use handeye_tests::CellProcess;
 use handeye_tests::served::Served;
 use rand::{RngExt as _, SeedableRng as _};

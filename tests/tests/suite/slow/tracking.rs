@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use handeye_coppeliasim::cell::{Arm, CellClient, CellPaths, MotionTolerance, SettleOptions};
+use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
 use handeye_geometry::frames::{Base, Pose, Target};
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_geometry::testing::python;
-use handeye_sim_link::client::cell::{Arm, CellClient, CellPaths, MotionTolerance, SettleOptions};
-use handeye_sim_link::client::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
 use handeye_tests::{CellProcess, handeye_binary, workspace_root};
 use nalgebra::Point3;
 use serde_json::Value;

@@ -2,10 +2,10 @@
 
 use handeye_app::command::Command;
 use handeye_app::model::{CellSource, JogSettings, Model, Motion};
+use handeye_cell::scene::Scene;
 use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_server::{CellConfig, CellServer};
 use handeye_session::Role;
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry};
 

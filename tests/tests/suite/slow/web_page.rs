@@ -7,8 +7,8 @@ use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
 use ciborium::Value;
-use handeye_sim_link::client::cell::{Arm, CellPaths};
-use handeye_sim_link::client::{ConnectionOptions, Endpoint};
+use handeye_coppeliasim::cell::{Arm, CellPaths};
+use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use handeye_tests::{CellProcess, hostile};
 
 /// Longer than a browser takes on a busy machine.

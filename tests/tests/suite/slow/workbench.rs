@@ -5,10 +5,10 @@ use std::path::Path;
 use handeye_app::command::Command;
 use handeye_app::model::{CapturePurpose, CellSource, Message, Model, SolveStatus};
 use handeye_app::text::Language;
+use handeye_cell::scene::Scene;
 use handeye_result::CalibrationResult;
+use handeye_server::{CellConfig, CellServer};
 use handeye_session::{CaptureId, Role};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::cell::server::{CellConfig, CellServer};
 use handeye_tests::hurry;
 use handeye_tests::workbench::Workbench;
 

@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use crossbeam_channel::bounded;
 use handeye_capture::{Scatter, Wait};
+use handeye_cell::scene::Scene;
+use handeye_coppeliasim::{CancelToken, MotionLimits};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
-use handeye_sim_link::cell::scene::Scene;
-use handeye_sim_link::client::{CancelToken, MotionLimits};
 
 use crate::command::Event;
 use crate::model::{CaptureWait, RefusalKind};
