@@ -1,4 +1,4 @@
-//! The Handeye Workbench: a window and a command line over the libraries in `core` and [`handeye_sim_link`].
+//! The Handeye Workbench: a window and a command line over the libraries in `core` and `sim_link`.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod app;

@@ -6,6 +6,18 @@
 //! | [`Connection`] | calls, time limits, recovery |
 //! | [`Sim`] | functions of `sim.*` with their types; CoppeliaSim's conventions end in [`convert`] |
 //! | [`cell`] | an arm with a camera: move, stop, look, and the truth of a simulated cell |
+//!
+//! ```no_run
+//! use handeye_coppeliasim::cell::{Arm, CellPaths};
+//! use handeye_coppeliasim::{ConnectionOptions, Endpoint};
+//!
+//! let endpoint: Endpoint = "127.0.0.1:23000".parse()?;
+//! let arm = Arm::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default())?;
+//! println!("{:?}", arm.info());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Never depends on the simulated cell or its server.
 
 pub mod cell;
 mod connection;

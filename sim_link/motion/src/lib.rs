@@ -1,7 +1,17 @@
-//! Motions of the cell: jerk-limited moves of joints and poses, sampled at any step.
+//! Jerk-limited moves of joints and poses, sampled at any step.
 //!
 //! Positions are radians or metres, whatever the caller's degrees of freedom are; velocities, accelerations and jerks
 //! are their derivatives by seconds. Nothing here knows a clock: a motion moves on by the `dt` that it is given.
+//!
+//! ```
+//! use handeye_motion::{JointMotion, MotionLimits, MotionState, Sync};
+//!
+//! let limits = MotionLimits::uniform(1, 1.0, 2.0, 10.0);
+//! let mut motion = JointMotion::new(MotionState::at_rest(vec![0.0]), &[0.5], &[0.0], Some(&limits), Sync::Time)?;
+//! while !motion.step(0.01).finished {}
+//! assert_eq!(motion.state().pos, [0.5]);
+//! # Ok::<(), handeye_motion::MotionError>(())
+//! ```
 
 mod board_motion;
 mod course;

@@ -3,6 +3,17 @@
 //! CoppeliaSim writes floats at any width, integers where a float is meant, text or bytes for strings, and an empty
 //! map for an empty list. The readers of [`Reader`] accept all of these; the writers emit definite lengths, no tags,
 //! null rather than undefined.
+//!
+//! ```
+//! use ciborium::Value;
+//! use handeye_wire::{decode, encode};
+//!
+//! let call = Value::Map(vec![("func".into(), "sim.getSimulationTime".into())]);
+//! assert_eq!(decode(&encode(&call))?, call);
+//! # Ok::<(), handeye_wire::WireError>(())
+//! ```
+//!
+//! Never depends on a socket, a client or a cell.
 
 pub mod axes;
 
