@@ -185,7 +185,7 @@ fn main() -> anyhow::Result<()> {
     window
         .env("DISPLAY", format!(":{}", number.trim()))
         .env("LIBGL_ALWAYS_SOFTWARE", "1")
-        .env("RUST_LOG", "handeye_app::live::textures=trace")
+        .env("RUST_LOG", "handeye_ui::live::textures=trace")
         .env_remove("WAYLAND_DISPLAY")
         .stderr(Stdio::piped());
     let mut window = window.spawn()?;

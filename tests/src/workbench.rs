@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use handeye_app::app::{App, Connect, Start};
-use handeye_app::command::Command;
-use handeye_app::model::{CellSource, Model, ViewSettings};
-use handeye_app::rerun_log::RerunChoice;
-use handeye_app::text::Language;
-use handeye_app::worker::{Clock, Waker};
 use handeye_coppeliasim::cell::CellPaths;
+use handeye_workbench::app::{App, Connect, Start};
+use handeye_workbench::command::Command;
+use handeye_workbench::model::{CellSource, Model, ViewSettings};
+use handeye_workbench::rerun_log::RerunChoice;
+use handeye_workbench::text::Language;
+use handeye_workbench::worker::{Clock, Waker};
 
 /// Longer than anything that a test waits for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(6);
@@ -42,7 +42,7 @@ impl Workbench {
         });
         let began = Instant::now();
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(handeye_app::connect::connector);
+        let connect: Connect = Arc::new(handeye_workbench::connect::connector);
         let start = Start {
             source,
             view: ViewSettings::default(),

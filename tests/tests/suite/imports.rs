@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use handeye_app::command::Command as AppCommand;
-use handeye_app::model::{CellSource, Dialog, Model};
-use handeye_app::text::Language;
 use handeye_dataset::Dataset;
 use handeye_geometry::testing::{data_folder, python};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::workspace_root;
+use handeye_workbench::command::Command as AppCommand;
+use handeye_workbench::model::{CellSource, Dialog, Model};
+use handeye_workbench::text::Language;
 use nalgebra::Matrix4;
 use serde_json::Value;
 use tempfile::TempDir;

@@ -3,9 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::process::Command as Program;
 
-use handeye_app::command::Command;
-use handeye_app::limits;
-use handeye_app::model::{CapturePurpose, CellSource, Drivers, JogSettings, LinkState, Model, Motion, SolveStatus};
 use handeye_cell::scene::{Scene, ShippedScene};
 use handeye_coppeliasim::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint};
@@ -15,6 +12,11 @@ use handeye_plan::guided::CHECKS;
 use handeye_server::{CellConfig, CellServer};
 use handeye_tests::handeye_binary;
 use handeye_tests::workbench::Workbench;
+use handeye_workbench::command::Command;
+use handeye_workbench::limits;
+use handeye_workbench::model::{
+    CapturePurpose, CellSource, Drivers, JogSettings, LinkState, Model, Motion, SolveStatus,
+};
 
 /// A cell that keeps pace with real time, as drivers of hardware do.
 fn cell() -> (CellServer, Endpoint) {

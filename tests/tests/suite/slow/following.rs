@@ -2,8 +2,6 @@
 
 use std::process::Command as Process;
 
-use handeye_app::command::Command;
-use handeye_app::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
 use handeye_cell::scene::{BoardMotionSpec, Scene};
 use handeye_coppeliasim::cell::FollowLimits;
 use handeye_coppeliasim::{CallOptions, ConnectionOptions, Sim};
@@ -13,6 +11,8 @@ use handeye_session::CaptureId;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, workspace_root};
 use handeye_track::State;
+use handeye_workbench::command::Command;
+use handeye_workbench::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -103,7 +103,7 @@ fn tracking_at(folder: &std::path::Path, file: &str, config: CellConfig, first: 
     bench.click(Command::GoToCapture(first));
     // The arm may be there already.
     bench.click(Command::ConfirmMove);
-    bench.until("the arm at the first pose", |model| model.motion == handeye_app::model::Motion::Idle);
+    bench.until("the arm at the first pose", |model| model.motion == handeye_workbench::model::Motion::Idle);
     bench.click(Command::SetTracking(true));
     bench.until("the board", is_tracked);
     (bench, cell)
@@ -279,7 +279,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
         bench.click(Command::HideBoard(false));
         bench.click(Command::GoToCapture(FIRST));
         bench.click(Command::ConfirmMove);
-        bench.until("the arm at the first pose", |model| model.motion == handeye_app::model::Motion::Idle);
+        bench.until("the arm at the first pose", |model| model.motion == handeye_workbench::model::Motion::Idle);
         bench.until("the board", is_tracked);
     }
     println!("{trials} hidden boards: at rest within the limits every time");

@@ -4,10 +4,6 @@
 use std::path::Path;
 use std::process::{Command as Process, Output};
 
-use handeye_app::command::Command;
-use handeye_app::guided::state::GuidedProgress;
-use handeye_app::model::{CellSource, JogSettings, Model, Motion, MotionGoal};
-use handeye_app::text::Text;
 use handeye_cell::scene::Scene;
 use handeye_geometry::planar_pose;
 use handeye_geometry::targets::observation::Corner;
@@ -17,6 +13,10 @@ use handeye_server::{CellConfig, CellServer};
 use handeye_session::Role;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry, workspace_root};
+use handeye_workbench::command::Command;
+use handeye_workbench::guided::state::GuidedProgress;
+use handeye_workbench::model::{CellSource, JogSettings, Model, Motion, MotionGoal};
+use handeye_workbench::text::Text;
 use nalgebra::Point3;
 
 fn auto(folder: &Path, arguments: &[&str]) -> Output {

@@ -5,9 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr};
 use std::time::{Duration, Instant};
 
-use handeye_app::command::Command;
-use handeye_app::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
-use handeye_app::rerun_log::RerunChoice;
 use handeye_capture::Wait;
 use handeye_coppeliasim::cell::{Arm, CellPaths};
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, MotionLimits, SimulationState};
@@ -15,6 +12,9 @@ use handeye_session::Session;
 use handeye_tests::CellProcess;
 use handeye_tests::process::{end_of, signal, start, until_said};
 use handeye_tests::workbench::Workbench;
+use handeye_workbench::command::Command;
+use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
+use handeye_workbench::rerun_log::RerunChoice;
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use handeye_app::command::Command;
-use handeye_app::model::{CellSource, Model, SolveStatus};
 use handeye_arm::JointValues;
 use handeye_coppeliasim::cell::{Arm, CellPaths};
 use handeye_coppeliasim::{ConnectionOptions, Endpoint};
@@ -13,6 +11,8 @@ use handeye_session::Store;
 use handeye_tests::CellProcess;
 use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::workbench::Workbench;
+use handeye_workbench::command::Command;
+use handeye_workbench::model::{CellSource, Model, SolveStatus};
 
 /// The workbench gives itself 2 s to end. The rest is what a machine with other work takes to run it at all; one that waits
 /// for an answer, a motion or a file takes longer.

@@ -4,8 +4,6 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use handeye_app::command::Command;
-use handeye_app::model::CellSource;
 use handeye_coppeliasim::cell::{CellClient, CellPaths};
 use handeye_coppeliasim::{ConnectionOptions, Endpoint};
 use handeye_estimate::handeye::HandEye;
@@ -13,6 +11,8 @@ use handeye_geometry::se3;
 use handeye_result::{CalibrationResult, TransformEstimate};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{CellProcess, workspace_root};
+use handeye_workbench::command::Command;
+use handeye_workbench::model::CellSource;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::solved::{handeye, text, utf8};

@@ -1,13 +1,13 @@
 //! Verification at poses that the program plans, by what a user clicks, on the built-in cell over its real socket.
 
-use handeye_app::command::Command;
-use handeye_app::model::{CellSource, JogSettings, Model, Motion};
 use handeye_cell::scene::Scene;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_server::{CellConfig, CellServer};
 use handeye_session::Role;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry};
+use handeye_workbench::command::Command;
+use handeye_workbench::model::{CellSource, JogSettings, Model, Motion};
 
 /// The ten reference poses, captured and solved, and a cell to verify on. At full speed, or it takes minutes.
 fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {

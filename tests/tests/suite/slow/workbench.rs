@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use handeye_app::command::Command;
-use handeye_app::model::{CapturePurpose, CellSource, Message, Model, SolveStatus};
-use handeye_app::text::Language;
 use handeye_cell::scene::Scene;
 use handeye_result::CalibrationResult;
 use handeye_server::{CellConfig, CellServer};
 use handeye_session::{CaptureId, Role};
 use handeye_tests::hurry;
 use handeye_tests::workbench::Workbench;
+use handeye_workbench::command::Command;
+use handeye_workbench::model::{CapturePurpose, CellSource, Message, Model, SolveStatus};
+use handeye_workbench::text::Language;
 
 fn connected(model: &Model) -> bool {
     model.control.is_connected()
@@ -92,8 +92,8 @@ fn ten_poses_are_visited_captured_solved_verified_and_exported() {
 
     // One more from between two poses, which verifies and never enters the fit.
     bench.allow(Command::GoToCapture(CaptureId(3)));
-    bench.until("the arm at pose 3", |model| model.motion == handeye_app::model::Motion::Idle);
-    bench.click(Command::SetCaptureOptions(handeye_app::model::CaptureOptions {
+    bench.until("the arm at pose 3", |model| model.motion == handeye_workbench::model::Motion::Idle);
+    bench.click(Command::SetCaptureOptions(handeye_workbench::model::CaptureOptions {
         least_distance_m: 0.0,
         least_angle_rad: 0.0,
         ..Default::default()

@@ -1,0 +1,197 @@
+//! `handeye auto --poses guided`: every pose is chosen by what the captures so far leave open.
+
+use std::collections::BTreeMap;
+
+use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_dataset::taught_poses::Goal;
+use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::{Method, Observations};
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::observation::Sight;
+use handeye_plan::Surroundings;
+use handeye_plan::guided::choose::{Proposal, Robot};
+use handeye_plan::guided::{Ending, Guide, Known, Next};
+use handeye_session::CaptureId;
+
+use super::super::Failure;
+use super::super::towards_board::TowardsBoard;
+use super::sequence::PoseSequence;
+use handeye_workbench::limits;
+use handeye_workbench::model::CapturePurpose;
+use handeye_workbench::text::Language;
+
+/// A guided session on its way.
+pub struct GuidedSequence<'a, 's> {
+    /// What goes to poses and captures there.
+    pub sequence: &'a mut PoseSequence<'s>,
+    /// What chooses the poses.
+    pub guide: &'a mut Guide,
+    /// The chain of the arm.
+    pub kinematics: &'a ArmKinematics,
+    /// What stands around, besides the board.
+    pub around: Surroundings,
+    /// Captures that check the answer afterwards.
+    pub checks: usize,
+    /// Where to go if the board is not in view from where the arm stands, one after the other.
+    pub towards_board: Vec<TowardsBoard>,
+    /// What was found in the captures.
+    sights: BTreeMap<CaptureId, Sight>,
+    image_size: (u32, u32),
+    /// Captures and tries so far.
+    number: u64,
+    /// Simulated time of the first and of the last capture, seconds.
+    time_s: Option<[f64; 2]>,
+}
+
+impl<'a, 's> GuidedSequence<'a, 's> {
+    /// Nothing is captured yet.
+    pub fn new(
+        sequence: &'a mut PoseSequence<'s>,
+        guide: &'a mut Guide,
+        kinematics: &'a ArmKinematics,
+        around: Surroundings,
+        checks: usize,
+        towards_board: Vec<TowardsBoard>,
+    ) -> Self {
+        Self {
+            sequence,
+            guide,
+            kinematics,
+            around,
+            checks,
+            towards_board,
+            sights: BTreeMap::new(),
+            image_size: (0, 0),
+            number: 0,
+            time_s: None,
+        }
+    }
+
+    /// From the board in view to the end of the session, and the captures that check it.
+    pub fn run(&mut self) -> Result<Ending, Failure> {
+        self.sequence.begin()?;
+        let here = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
+        if !self.visit(&Goal::Joints(here.to_vec()), CapturePurpose::Calibrate)? && !self.look_for_board()? {
+            return Err(Failure::failed(anyhow::anyhow!(
+                "the board is not captured from where the arm stands: bring the whole board into the image and begin again"
+            )));
+        }
+        let (ending, observations, calibration) = loop {
+            let (observations, calibration) = self.solve()?;
+            let robot = self.robot()?;
+            let known = self.known(&observations, calibration.as_ref(), &robot);
+            let next = self.guide.next(&known, self.sequence.cancel);
+            self.check_cancelled()?;
+            let plan = match next {
+                Next::End(ending) => break (ending, observations, calibration),
+                Next::Go { plan, why } => {
+                    tracing::info!("{}", why.text().say(Language::English));
+                    if let Some(hold) = self.guide.hold() {
+                        tracing::info!("{}", hold.text().say(Language::English));
+                    }
+                    plan
+                }
+            };
+            let goal = joints(plan.proposals.first())?;
+            if self.visit(&goal, CapturePurpose::Calibrate)? {
+                self.guide.captured();
+            } else {
+                self.guide.failed();
+            }
+        };
+        tracing::info!("{}", ending.text().say(Language::English));
+        if calibration.is_some() {
+            self.check(&observations, calibration.as_ref())?;
+        }
+        Ok(ending)
+    }
+
+    /// Goes to where the board should be in view, on ways that are known to be free; whether it was captured there.
+    fn look_for_board(&mut self) -> Result<bool, Failure> {
+        let goals = std::mem::take(&mut self.towards_board);
+        let among = self.kinematics.among(self.around.clone(), None);
+        self.sequence.cell.arm().keep_clear(Some(among));
+        for TowardsBoard { name, joints } in goals {
+            tracing::info!("the board is not in view here: the arm goes to {name}");
+            if self.visit(&Goal::Joints(joints.to_vec()), CapturePurpose::Calibrate)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Captures that were not designed and never enter the fit.
+    fn check(&mut self, observations: &Observations, calibration: Option<&Calibration>) -> Result<(), Failure> {
+        for index in 0..self.checks {
+            let robot = self.robot()?;
+            let known = self.known(observations, calibration, &robot);
+            let Some(proposal) = self.guide.check_pose(&known, index, 0, self.sequence.cancel) else {
+                tracing::warn!("there is no further view in reach to check the answer at");
+                break;
+            };
+            self.visit(&joints(Some(&proposal))?, CapturePurpose::Verify)?;
+        }
+        Ok(())
+    }
+
+    fn known<'k>(
+        &self,
+        observations: &'k Observations,
+        calibration: Option<&'k Calibration>,
+        robot: &'k Robot,
+    ) -> Known<'k> {
+        Known {
+            observations,
+            calibration,
+            robot: Some(robot),
+            elapsed_s: self.time_s.map_or(0.0, |[first, last]| last - first),
+        }
+    }
+
+    /// Whether it gave a capture.
+    fn visit(&mut self, goal: &Goal, purpose: CapturePurpose) -> Result<bool, Failure> {
+        self.number += 1;
+        let name = match purpose {
+            CapturePurpose::Calibrate => format!("guided {}", self.number),
+            CapturePurpose::Verify => format!("check {}", self.number),
+        };
+        let Some((id, measured)) = self.sequence.visit(self.number, &name, goal, purpose)? else { return Ok(false) };
+        self.image_size = measured.rgb.dimensions();
+        self.sights.insert(id, Sight { corners: measured.corners.clone(), depth: measured.depth_plane });
+        let first_s = self.time_s.map_or(measured.sim_time_s, |[first, _]| first);
+        self.time_s = Some([first_s, measured.sim_time_s]);
+        tracing::info!("captured ({name})");
+        Ok(true)
+    }
+
+    /// What the captures give, with what speaks against it.
+    fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
+        let document = self.sequence.session.document();
+        let observations = document.observations(self.image_size, |id| self.sights.get(&id).cloned()).observations;
+        let cancel: &CancelToken = self.sequence.cancel;
+        let calibration = calibrate(&observations, Method::Joint, cancel).ok();
+        self.check_cancelled()?;
+        Ok((observations, calibration))
+    }
+
+    fn check_cancelled(&self) -> Result<(), Failure> {
+        if self.sequence.cancel.is_cancelled() {
+            return Err(Failure::failed(anyhow::anyhow!("interrupted")));
+        }
+        Ok(())
+    }
+
+    fn robot(&mut self) -> Result<Robot, Failure> {
+        let joints = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
+        let pace = limits::pace(&self.sequence.plan.limits, 1.0);
+        Ok(self.kinematics.guided_robot(&joints, pace, &self.around))
+    }
+}
+
+/// Where the arm goes: to the joint values whose way was checked, and nowhere else.
+fn joints(proposal: Option<&Proposal>) -> Result<Goal, Failure> {
+    let joints = proposal.and_then(|proposal| proposal.joints);
+    let joints =
+        joints.ok_or_else(|| Failure::failed(anyhow::anyhow!("no joint values were chosen for the next pose")))?;
+    Ok(Goal::Joints(joints.to_vec()))
+}

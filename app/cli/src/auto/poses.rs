@@ -1,0 +1,143 @@
+//! Which poses `handeye auto` visits, and how fast.
+
+use std::path::Path;
+
+use handeye_arm::JointValues;
+use handeye_cell::scene::{ResolvedScene, Scene};
+use handeye_coppeliasim::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
+use handeye_dataset::taught_poses::{Goal, MotionLimits, TaughtPoses};
+use handeye_plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
+
+use super::super::{Failure, towards_board};
+use handeye_workbench::limits;
+use handeye_workbench::session::start::{BOARD, REFERENCE_POSES};
+
+/// How much the board is tilted at most where guided capture begins.
+const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// How many views `--poses auto` plans.
+const PLANNED_VIEWS: usize = 20;
+
+/// The ten reference poses.
+pub const REFERENCE: &str = "seed10";
+/// Poses that are chosen on the way.
+pub const GUIDED: &str = "guided";
+/// Views of the board that are planned beforehand.
+pub const PLANNED: &str = "auto";
+
+/// A sequence of poses.
+pub struct Plan {
+    /// Where the arm begins.
+    pub start_joints: Option<Vec<f64>>,
+    /// Names and goals in order.
+    pub goals: Vec<(String, Goal)>,
+    /// How fast it moves between them.
+    pub limits: MotionLimits,
+}
+
+impl Plan {
+    /// The poses of that name or file; `auto` plans views of the scene's board.
+    pub fn find(what: &str, scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
+        match what {
+            REFERENCE => {
+                let poses = TaughtPoses::parse(Path::new(REFERENCE), REFERENCE_POSES).map_err(Failure::failed)?;
+                Ok(Self::taught(&poses))
+            }
+            PLANNED => Self::planned(scene, seed),
+            GUIDED => Self::begun(scene, seed),
+            file => Ok(Self::taught(&TaughtPoses::read(Path::new(file)).map_err(Failure::unusable)?)),
+        }
+    }
+
+    /// Whether the arm has as many joints as the poses have values.
+    pub fn check_joints(&self, need: usize) -> Result<(), Failure> {
+        let goals = self.goals.iter().filter_map(|(_, goal)| match goal {
+            Goal::Joints(joints) => Some(joints.len()),
+            Goal::Tip(_) => None,
+        });
+        match self.start_joints.iter().map(Vec::len).chain(goals).find(|got| *got != need) {
+            None => Ok(()),
+            Some(got) => Err(Failure::unusable(anyhow::anyhow!(
+                "the poses are for an arm of {got} joints and this one has {need}: give a pose file of this arm, or `--poses \
+                 auto` with its scene"
+            ))),
+        }
+    }
+
+    fn taught(taught: &TaughtPoses) -> Self {
+        Self {
+            start_joints: taught.start_joints_rad.clone(),
+            goals: taught.poses.iter().map(|p| (p.name.clone(), p.goal.clone())).collect(),
+            limits: taught.limits.unwrap_or(limits::SEQUENCE),
+        }
+    }
+
+    /// No pose but the one to begin at: with the board in view, as a person jogs the arm first.
+    fn begun(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
+        let resolved = meant(scene, seed)?;
+        let options = ViewOptions { count: 1, cone_rad: FIRST_TILT_RAD, seed: resolved.seed, ..ViewOptions::default() };
+        let views = poses_looking_at(&ViewSetup::from(&resolved), &options).map_err(Failure::failed)?;
+        let start_joints = views.first().map(|view| view.joints.to_vec());
+        Ok(Self { start_joints, goals: Vec::new(), limits: limits::SEQUENCE })
+    }
+
+    /// Views of the board of a cell that is running, from where its arm stands: by its truth where it publishes that, and else by
+    /// where its scene has board and camera.
+    pub fn planned_here(
+        arm: &mut Arm,
+        kinematics: Option<&ArmKinematics>,
+        truth: &GroundTruth,
+        around: &Surroundings,
+        seed: u64,
+    ) -> Result<Self, Failure> {
+        let kinematics = kinematics.ok_or_else(|| {
+            Failure::failed(anyhow::anyhow!(
+                "planned views take an arm whose chain is known (docs/reference/arms.md): \
+                 give the poses by a file, --poses FILE"
+            ))
+        })?;
+        let base_from_target = towards_board::base_from_target(arm, truth)?.ok_or_else(|| {
+            Failure::failed(anyhow::anyhow!(
+                "the position of the board is not known here, so that no views of it can be planned: name it by --object \
+                 board=PATH, or bring it into the image and use --poses guided"
+            ))
+        })?;
+        let GroundTruth { tip_from_camera, intrinsics, .. } = *truth;
+        let board = BoardInView { base_from_target, target: BOARD, intrinsics, tip_from_camera };
+        let here = arm.joint_values().map_err(Failure::failed)?;
+        let views =
+            kinematics.views_unlike(&board, &[], &here, around, PLANNED_VIEWS, seed).map_err(Failure::failed)?;
+        Ok(Self { start_joints: None, goals: named(views.iter()), limits: limits::SEQUENCE })
+    }
+
+    /// None at all: the arm begins where it stands.
+    pub fn from_here() -> Self {
+        Self { start_joints: None, goals: Vec::new(), limits: limits::SEQUENCE }
+    }
+
+    /// Views from where the scene says that board and camera are *meant* to be: what a person planning a sequence knows.
+    fn planned(scene: &Scene, seed: Option<u64>) -> Result<Self, Failure> {
+        let resolved = meant(scene, seed)?;
+        let seed = resolved.seed;
+        let options = ViewOptions { count: PLANNED_VIEWS, seed, ..ViewOptions::default() };
+        let views = poses_looking_at(&ViewSetup::from(&resolved), &options).map_err(Failure::failed)?;
+        Ok(Self {
+            start_joints: Some(resolved.start_joints.to_vec()),
+            goals: named(views.iter().map(|view| &view.joints)),
+            limits: limits::SEQUENCE,
+        })
+    }
+}
+
+fn named<'a>(views: impl Iterator<Item = &'a JointValues>) -> Vec<(String, Goal)> {
+    views.enumerate().map(|(i, joints)| (format!("planned {}", i + 1), Goal::Joints(joints.to_vec()))).collect()
+}
+
+/// The scene with board and camera where they are meant to be.
+fn meant(scene: &Scene, seed: Option<u64>) -> Result<ResolvedScene, Failure> {
+    let mut meant = scene.clone();
+    meant.camera.random_offset_mm = 0.0;
+    meant.camera.random_offset_deg = 0.0;
+    meant.board.random_offset_mm = 0.0;
+    meant.board.random_offset_deg = 0.0;
+    meant.resolve(seed.unwrap_or(scene.seed)).map_err(Failure::unusable)
+}

@@ -1,0 +1,113 @@
+//! `handeye cell`: serves the built-in cell.
+
+use std::time::Duration;
+
+use clap::Args;
+use handeye_cell::scene::{BoardPath, Scene, SceneChoice};
+use handeye_server::{CellConfig, CellServer};
+
+use crate::{Failure, out, solve};
+use handeye_workbench::arguments::heading;
+
+/// Options of `handeye cell`.
+#[derive(Debug, Args)]
+pub struct CellArgs {
+    /// Address of the network interface to serve on. Whoever can connect can move the arm: there is no password.
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1", help_heading = heading::ACCESS)]
+    bind: String,
+    /// Port; 0 picks one that is free.
+    #[arg(long, value_name = "PORT", default_value_t = 23000, help_heading = heading::ACCESS)]
+    port: u16,
+    /// Seed of everything random in the cell; the scene's own if not given.
+    #[arg(long, value_name = "N", help_heading = heading::CELL)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    scene: SceneArg,
+    /// Let simulated time run as fast as it can instead of like real time.
+    #[arg(long, help_heading = heading::CELL)]
+    fast: bool,
+    /// Have the board move: still, circle, figure_eight, random_walk or step; as the scene says if not given.
+    #[arg(long, value_name = "PATH", help_heading = heading::BOARD)]
+    board_path: Option<BoardPath>,
+    /// Mean speed of the board in m/s; as the scene says if not given.
+    #[arg(long, value_name = "SPEED", help_heading = heading::BOARD)]
+    board_speed: Option<f64>,
+    /// How far the path of the board reaches in m; as the scene says if not given.
+    #[arg(long, value_name = "SIZE", help_heading = heading::BOARD)]
+    board_size: Option<f64>,
+    /// Largest angle in degrees by which the board is turned on its way; as the scene says if not given.
+    #[arg(long, value_name = "ANGLE", help_heading = heading::BOARD)]
+    board_tilt: Option<f64>,
+    /// Simulated time from image to image in s; as the scene says if not given.
+    #[arg(long, value_name = "SECONDS", help_heading = heading::CELL)]
+    time_step: Option<f64>,
+    /// Leave out the functions that CoppeliaSim does not have (`handeye.*`), to try a program as it runs there.
+    #[arg(long, help_heading = heading::CELL)]
+    coppeliasim_only: bool,
+}
+
+impl CellArgs {
+    /// The scene with what the options say about it.
+    fn scene(&self) -> Result<Scene, Failure> {
+        let mut scene = self.scene.load()?;
+        let motion = &mut scene.board.motion;
+        motion.path = self.board_path.unwrap_or(motion.path);
+        motion.speed_m_s = self.board_speed.unwrap_or(motion.speed_m_s);
+        motion.size_m = self.board_size.unwrap_or(motion.size_m);
+        motion.tilt_deg = self.board_tilt.unwrap_or(motion.tilt_deg);
+        motion.validate().map_err(|reason| Failure::unusable(anyhow::anyhow!("the motion of the board: {reason}")))?;
+        scene.simulation.time_step_s = self.time_step.unwrap_or(scene.simulation.time_step_s);
+        Ok(scene)
+    }
+}
+
+/// The option `--scene`.
+#[derive(Debug, Args)]
+pub struct SceneArg {
+    /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, coppeliasim, tracking, panda, xarm6; the
+    /// reference scene if not given.
+    #[arg(long, value_name = "FILE|NAME", help_heading = heading::CELL)]
+    scene: Option<SceneChoice>,
+}
+
+impl SceneArg {
+    /// Reads the scene.
+    pub fn load(&self) -> Result<Scene, Failure> {
+        self.scene.clone().unwrap_or_default().load().map_err(Failure::unusable)
+    }
+
+    /// Whether one was named.
+    pub fn is_given(&self) -> bool {
+        self.scene.is_some()
+    }
+}
+
+/// How soon after Ctrl-C the cell ends.
+const POLL: Duration = Duration::from_millis(100);
+
+pub fn run(args: &CellArgs) -> Result<(), Failure> {
+    let server = CellServer::start(CellConfig {
+        seed: args.seed,
+        bind: args.bind.clone(),
+        port: args.port,
+        real_time: args.fast.then_some(false),
+        coppeliasim_only: args.coppeliasim_only,
+        ..CellConfig::new(args.scene()?)
+    })
+    .map_err(Failure::failed)?;
+    if !server.is_local() {
+        // Even when quiet: nobody should learn of it from somebody else.
+        out::note(format_args!(
+            "warning: everybody on the network who reaches {} can move the arm and see its images, and there is no \
+             password; --bind 127.0.0.1 serves this machine alone",
+            server.endpoint()
+        ));
+    }
+    out::line(format_args!("listening on {}", server.endpoint()))?;
+    let cancel = solve::cancel_on_ctrl_c();
+    while !cancel.is_cancelled() {
+        std::thread::sleep(POLL);
+    }
+    server.stop();
+    Ok(())
+}

@@ -1,0 +1,192 @@
+//! The command line. Other programs call it: names, options and exit codes are a contract.
+//!
+//! Results go to standard output, progress and messages to standard error. Exit code 0: done, 1: failed, 2: wrong usage
+//! or unreadable input.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
+mod arm_arg;
+mod auto;
+mod box_arg;
+mod calibrate;
+mod cell;
+mod doctor;
+pub(crate) mod driver;
+mod export;
+mod failure;
+mod gate;
+#[cfg(test)]
+mod help_tests;
+mod import;
+mod late;
+#[cfg(test)]
+mod offered_tests;
+mod out;
+mod output;
+mod plan;
+mod record;
+mod rerun_arg;
+mod sample;
+mod shared;
+mod solve;
+pub(crate) mod target;
+mod towards_board;
+mod track;
+
+use std::io::{IsTerminal as _, Write as _};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+use handeye_serve::ServeArgs;
+use handeye_ui::GuiArgs;
+
+pub use failure::Failure;
+use handeye_workbench::arguments::ObjectArgs;
+use handeye_workbench::arguments::RerunArg;
+
+/// The least that is to be known.
+const EXAMPLES: &str = "Examples, the first of which opens the window:
+  handeye
+  handeye sample --out my_robot_images
+  handeye calibrate my_robot_images --json result.json
+  handeye auto --help";
+
+/// Calibrates a robot's camera: live in a window, or from the command line.
+#[derive(Debug, Parser)]
+#[command(name = "handeye", version, max_term_width = 100, after_help = EXAMPLES)]
+struct Cli {
+    /// Say nothing but results and errors.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Open the workbench (the default).
+    #[command(after_help = "Examples:\n  handeye gui --scene panda\n  handeye gui --connect tcp://192.168.0.7:23000")]
+    Gui(GuiArgs),
+    /// Show the workbench in a browser, here or on another machine, until Ctrl-C (docs/reference/browser.md).
+    #[command(after_help = "Examples:\n  handeye serve\n  handeye serve --bind 0.0.0.0 --port 8600")]
+    Serve(ServeArgs),
+    /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.
+    #[command(after_help = "Examples:\n  handeye cell --port 0 --scene realistic --seed 7")]
+    Cell(cell::CellArgs),
+    /// Drive the robot through poses, capture, solve, and write a session with its exports.
+    #[command(after_help = auto::EXAMPLES)]
+    Auto(auto::AutoArgs),
+    /// Solve a session or a dataset folder, or several of one camera together.
+    #[command(after_help = calibrate::EXAMPLES)]
+    Calibrate(calibrate::CalibrateArgs),
+    /// Write the recorded sample that comes with the program as a dataset folder, to try the other commands on.
+    #[command(after_help = sample::EXAMPLES)]
+    Sample(sample::SampleArgs),
+    /// Say what is wrong with a session or a dataset folder, and what to do about it.
+    #[command(
+        after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye doctor my_robot_images --json diagnosis.json"
+    )]
+    Doctor(doctor::DoctorArgs),
+    /// Say which poses would lower the expected error of a session or a dataset folder most.
+    #[command(
+        after_help = "Examples:\n  handeye sample --out my_robot_images\n  handeye plan my_robot_images --count 5 --json plan.json"
+    )]
+    Plan(plan::PlanArgs),
+    /// Track the board live with a calibration, and have the arm follow it.
+    #[command(after_help = track::EXAMPLES)]
+    Track(track::TrackArgs),
+    /// Try a driver, or be one: a program between the workbench and any robot or camera (docs/drivers.md).
+    #[command(after_help = driver::EXAMPLES)]
+    Driver(driver::DriverArgs),
+    /// Turn somebody's recording into a dataset folder: images with a table, a file to a pose, what other tools write.
+    #[command(after_help = import::after_help(), next_line_help = true)]
+    Import(import::ImportArgs),
+    /// Write calibration files from a solved session or a result JSON.
+    #[command(after_help = export::EXAMPLES)]
+    Export(export::ExportArgs),
+    /// Print a target as a PDF at exact physical scale, with rulers to check the print.
+    #[command(after_help = target::EXAMPLES)]
+    Target(target::TargetArgs),
+}
+
+/// Runs the program with the arguments of the process.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse_from(rerun_arg::joined(std::env::args_os())) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // `--help` and `--version` are answers, not errors; clap prints each to its proper stream.
+            if !error.use_stderr() {
+                let printed = error.print().and_then(|()| std::io::stdout().flush());
+                return ended(out::finished(printed, "standard output"));
+            }
+            // In an error there is what was typed, or what a pattern of the shell stood for.
+            let words = error.render().to_string();
+            if out::shown(&words) == words {
+                let _said = error.print().is_ok();
+            } else {
+                out::note(words.trim_end());
+            }
+            return ExitCode::from(2);
+        }
+    };
+    start_logging(cli.quiet);
+    let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
+        Command::Gui(args) => {
+            rerun_arg::check(&args.rerun).and_then(|()| handeye_ui::run(args).map_err(Failure::failed))
+        }
+        Command::Serve(args) => {
+            let is_local = args.bind.is_loopback();
+            let announce = |url: &str| {
+                if !is_local {
+                    // Even when quiet: nobody should learn of it from somebody else.
+                    out::note(
+                        "warning: everybody on the network who has the address with its key can move the arm and see \
+                         its images, and nothing is encrypted; --bind 127.0.0.1 serves this machine alone",
+                    );
+                }
+                // Nobody may listen to it any more: it is served all the same.
+                let _told = out::line(format_args!("the workbench is at {url}")).is_ok();
+            };
+            rerun_arg::check(&args.gui.rerun).and_then(|()| handeye_serve::run(args, announce).map_err(Failure::failed))
+        }
+        Command::Cell(args) => cell::run(&args),
+        Command::Auto(args) => auto::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::Sample(args) => sample::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+        Command::Plan(args) => plan::run(&args),
+        Command::Track(args) => track::run(&args),
+        Command::Driver(args) => driver::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Target(args) => target::run(&args),
+    };
+    ended(result)
+}
+
+fn ended(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            out::note(format_args!("error: {failure}"));
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+/// Messages of level INFO and above to standard error, errors only with `--quiet`; `RUST_LOG` overrides. The libraries of
+/// Rerun (`re_…`) warn of things that users can do nothing about.
+fn start_logging(quiet: bool) {
+    let default = if quiet { "error" } else { "warn,handeye=info,re_=error" };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
+    let is_coloured = std::io::stderr().is_terminal();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(move || out::Log { is_coloured })
+        .with_ansi(is_coloured)
+        .with_target(false)
+        .without_time()
+        .compact()
+        .init();
+}

@@ -1,0 +1,139 @@
+//! `handeye plan`: which poses would lower the expected error of a session or dataset folder most.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use handeye_estimate::diagnose::calibrate;
+use handeye_estimate::handeye::HandEyeError;
+use handeye_estimate::uncertainty::quality::TipBox;
+use handeye_estimate::{CalibrateError, Method};
+use handeye_geometry::frames::{Frame, Pose};
+use handeye_plan::guided::choose::Proposal;
+use handeye_plan::guided::{Guide, GuidedOptions, Known, Next, Why};
+use serde::Serialize;
+
+use super::output::Output;
+use crate::{Failure, box_arg, out, solve};
+use handeye_workbench::arguments::heading;
+
+/// Options of `handeye plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// Session or dataset folder: images, a pose table and dataset.toml.
+    path: PathBuf,
+    /// How many poses to propose.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=50), help_heading = heading::POSES)]
+    count: u32,
+    /// Seed of the views at random that are compared.
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = heading::POSES)]
+    seed: u64,
+    /// Where the tool works, in the camera (x right, y down, z forward): middle and edges, metres. Errors are then those of
+    /// the worst point of it; without it those where the camera saw the board.
+    #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true, help_heading = heading::POSES)]
+    tool_box: Option<TipBox>,
+    /// Write the poses as JSON to this file; `-` for standard output instead of the table.
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    json: Option<Output>,
+}
+
+/// The poses that come next.
+#[derive(Debug, Serialize)]
+struct PlanDocument {
+    format: &'static str,
+    version: u32,
+    /// The error now by the noise alone, 95 %, millimetres.
+    error_mm: f64,
+    poses: Vec<PlannedPose>,
+}
+
+/// A pose.
+#[derive(Debug, Serialize)]
+struct PlannedPose {
+    base_from_tip: Transform,
+    camera_from_target: Transform,
+    /// Expected error with this pose and those before it, 95 %, millimetres.
+    error_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Transform {
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+}
+
+impl<Dst: Frame, Src: Frame> From<&Pose<Dst, Src>> for Transform {
+    fn from(pose: &Pose<Dst, Src>) -> Self {
+        Self { translation_m: pose.translation().into(), rotation_xyzw: pose.xyzw() }
+    }
+}
+
+/// Prints the poses. Whether an arm reaches them is not known here.
+pub fn run(args: &PlanArgs) -> Result<(), Failure> {
+    let cancel = solve::cancel_on_ctrl_c();
+    let observations = solve::read(&args.path, &cancel)?.seen.observations;
+    let calibration = calibrate(&observations, Method::Joint, &cancel).map_err(|error| match error {
+        CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
+        error => solve::unsolved(error, &args.path, &observations, &cancel),
+    })?;
+    if calibration.hand_eye.is_none() || calibration.joint.is_none() {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "poses are planned for a robot and a camera: {} has no robot poses, or no corners",
+            args.path.display()
+        )));
+    }
+    let options = GuidedOptions {
+        // Poses are asked for, however good the answer is.
+        goal_m: 0.0,
+        least_gain: 0.0,
+        most_views: usize::MAX,
+        ahead: args.count as usize,
+        seed: args.seed,
+        tool_box: args.tool_box,
+        ..GuidedOptions::default()
+    };
+    let known = Known { observations: &observations, calibration: Some(&calibration), robot: None, elapsed_s: 0.0 };
+    let next = Guide::new(options).next(&known, &cancel);
+    if cancel.is_cancelled() {
+        return Err(Failure::failed(HandEyeError::Cancelled));
+    }
+    let (plan, error_m) = match next {
+        Next::Go { plan, why: Why::Gain { from_m, .. } } => (plan, from_m),
+        Next::Go { .. } | Next::End(_) => {
+            return Err(Failure::failed(anyhow::anyhow!(
+                "the views of {} do not determine an answer that poses could be planned from; `handeye doctor` says why",
+                args.path.display()
+            )));
+        }
+    };
+    let pose = |proposal: &Proposal| PlannedPose {
+        base_from_tip: (&proposal.base_from_tip).into(),
+        camera_from_target: (&proposal.camera_from_target).into(),
+        error_mm: error_m * proposal.error_ratio * 1e3,
+    };
+    let poses = plan.proposals.iter().map(pose).collect();
+    let document = PlanDocument { format: "handeye-plan", version: 1, error_mm: error_m * 1e3, poses };
+    if let Some(output) = &args.json {
+        let text = serde_json::to_string_pretty(&document).map_err(Failure::failed)?;
+        output.write(format!("{text}\n").as_bytes())?;
+    }
+    if args.json.as_ref().is_some_and(Output::is_standard) { Ok(()) } else { out::print(&table(&document)) }
+}
+
+fn table(document: &PlanDocument) -> String {
+    let mut text = format!("expected error now, by the noise alone: {:.3} mm (95 %)\n", document.error_mm);
+    text += "poses of the tip in the base; whether the arm reaches them is not checked\n";
+    text += "      x [mm]    y [mm]    z [mm]       qx       qy       qz       qw   then [mm]\n";
+    for (index, pose) in document.poses.iter().enumerate() {
+        let [x, y, z] = pose.base_from_tip.translation_m.map(|m| m * 1e3);
+        let [qx, qy, qz, qw] = pose.base_from_tip.rotation_xyzw;
+        // Into a string nothing can fail.
+        let _written = writeln!(
+            text,
+            "{:2} {x:9.1} {y:9.1} {z:9.1} {qx:8.4} {qy:8.4} {qz:8.4} {qw:8.4} {:11.3}",
+            index + 1,
+            pose.error_mm
+        );
+    }
+    text
+}

@@ -1,0 +1,166 @@
+//! `handeye track`: tracks the board live, and has the arm follow it.
+
+mod calibration;
+mod document;
+mod live;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use handeye_coppeliasim::Endpoint;
+use handeye_coppeliasim::cell::CellPaths;
+use handeye_coppeliasim::cell::{BoardMotion, BoardPath};
+use handeye_server::{CellConfig, CellServer};
+use handeye_track::{MotionModel, Setup};
+
+use super::cell::SceneArg;
+use super::output::Output;
+use crate::rerun_arg;
+use crate::{Failure, ObjectArgs, RerunArg, out, solve};
+use handeye_workbench::arguments::heading;
+use handeye_workbench::model::{FollowWish, Tracked};
+use handeye_workbench::rerun_log::{Pace, RerunChoice};
+use live::{Job, Live, Summary, Taken, Task};
+
+/// At the end of its help.
+pub const EXAMPLES: &str = "Examples:
+  handeye auto --out session
+  handeye track --calibration session/result.json --frames 100
+
+Until Ctrl-C:
+  handeye track --calibration session/result.json --follow";
+
+/// Options of `handeye track`.
+#[derive(Debug, Args)]
+pub struct TrackArgs {
+    /// Address of a CoppeliaSim or cell; without it the built-in cell is started, with a board that moves.
+    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
+    connect: Option<String>,
+    #[command(flatten)]
+    objects: ObjectArgs,
+    /// The calibration: a result JSON, or a session that is solved.
+    #[arg(long, value_name = "FILE", help_heading = heading::TRACKING)]
+    calibration: PathBuf,
+    /// Have the arm keep the view of the board that it has at the beginning.
+    #[arg(long, help_heading = heading::FOLLOWING)]
+    follow: bool,
+    /// With --follow: where the arm has no room to go along with the board, move it to the nearest place where it has, as
+    /// soon as the board is seen, and keep the view from there.
+    #[arg(long, requires = "follow", conflicts_with = "corner", help_heading = heading::FOLLOWING)]
+    make_room: bool,
+    /// With --follow: bring the tip to this corner of the board instead, counted from 0.
+    #[arg(long, value_name = "INDEX", requires = "follow", help_heading = heading::FOLLOWING)]
+    corner: Option<usize>,
+    /// Move the tip once to this corner of the board, counted from 0, with the orientation that it has; then end.
+    #[arg(long, value_name = "INDEX", conflicts_with = "follow", help_heading = heading::FOLLOWING)]
+    reach: Option<usize>,
+    /// With --corner and --reach: how far the tip stays off the board, millimetres.
+    #[arg(long, value_name = "MM", default_value_t = 100.0, help_heading = heading::FOLLOWING)]
+    stand_off: f64,
+    /// End after so many images; without it, at Ctrl-C.
+    #[arg(long, value_name = "N", help_heading = heading::TRACKING)]
+    frames: Option<u64>,
+    /// Write every pose and a summary as JSON to this file; `-` for standard output instead of the summary.
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    json: Option<Output>,
+    /// The chessboard, if the calibration does not say it: inner corners along x and y, and the square.
+    #[arg(long, value_name = "COLUMNSxROWSxMM", help_heading = heading::TRACKING)]
+    target: Option<String>,
+    #[command(flatten)]
+    scene: SceneArg,
+    /// Seed of everything random in the built-in cell.
+    #[arg(long, value_name = "N", help_heading = heading::CELL)]
+    seed: Option<u64>,
+    /// How the built-in cell moves its board: still, circle, figure_eight, random_walk or step; a circle if neither this
+    /// nor the scene says it.
+    #[arg(long, value_name = "PATH", conflicts_with = "connect", help_heading = heading::BOARD)]
+    board_path: Option<BoardPath>,
+    /// How fast, metres per second; as the scene says if not given.
+    #[arg(long, value_name = "SPEED", conflicts_with = "connect", help_heading = heading::BOARD)]
+    board_speed: Option<f64>,
+    #[command(flatten)]
+    rerun: RerunArg,
+}
+
+pub fn run(args: &TrackArgs) -> Result<(), Failure> {
+    let cancel = solve::cancel_on_ctrl_c();
+    if args.connect.is_some() && args.scene.is_given() {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "--scene describes the built-in cell and --connect takes another: give one of them"
+        )));
+    }
+    let (calibrated, said_target) = calibration::read(&args.calibration)?;
+    let target = match &args.target {
+        Some(text) => calibration::chessboard(text)?,
+        None => said_target.ok_or_else(|| {
+            Failure::unusable(anyhow::anyhow!(
+                "{} does not say which board it was made with: give --target, for example --target 10x7x15",
+                args.calibration.display()
+            ))
+        })?,
+    };
+    let mut scene = args.scene.load()?;
+    // The arm first has to look at the board.
+    let motion = std::mem::take(&mut scene.board.motion);
+    let path = args.board_path.unwrap_or(if motion.path == BoardPath::Still { BoardPath::Circle } else { motion.path });
+    let board = BoardMotion {
+        size_m: Some(motion.size_m),
+        tilt_deg: Some(motion.tilt_deg),
+        ..BoardMotion::along(path, args.board_speed.unwrap_or(motion.speed_m_s))
+    };
+    let paths = if args.connect.is_some() { CellPaths::default() } else { CellPaths::below(&scene.robot.name) };
+    let paths = args.objects.paths(paths);
+    let server = if args.connect.is_some() {
+        None
+    } else {
+        let config = CellConfig { seed: args.seed, real_time: Some(true), ..CellConfig::new(scene) };
+        Some(CellServer::start(config).map_err(Failure::failed)?)
+    };
+    let address = args.connect.clone().or_else(|| server.as_ref().map(CellServer::endpoint)).unwrap_or_default();
+    let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
+    if let Some(index) = args.corner.or(args.reach).filter(|&index| index >= target.len()) {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "there is no corner {index}: a {target} has corners 0 to {}",
+            target.len() - 1
+        )));
+    }
+    let stand_off_m = args.stand_off * 1e-3;
+    if !(stand_off_m.is_finite() && stand_off_m >= 0.0) {
+        return Err(Failure::unusable(anyhow::anyhow!("{} mm is not a distance: give 0 or more", args.stand_off)));
+    }
+    let task = match (args.follow, args.corner, args.reach) {
+        (_, _, Some(index)) => Task::Reach { index, stand_off_m },
+        (true, Some(index), None) => Task::Follow(FollowWish::Corner { index, stand_off_m }),
+        (true, None, None) if args.make_room => Task::Follow(FollowWish::KeepViewWithRoom),
+        (true, None, None) => Task::Follow(FollowWish::KeepView),
+        (false, _, None) => Task::Watch,
+    };
+    let recorder = rerun_arg::start(&args.rerun, RerunChoice::Off, Pace::Live, false)?;
+    let job = Job {
+        recorder: &recorder,
+        setup: Setup { target, calibrated, motion: MotionModel::default() },
+        task,
+        frames: args.frames,
+        // The board of somebody else's cell is not ours to move, nor is the arm before it follows.
+        own_cell: server.is_some().then_some(board),
+    };
+    let mut document = document::Document::begin(args.json.as_ref(), &args.calibration)?;
+    let mut add = |tracked: &Tracked| {
+        document.add(tracked)?;
+        if document.is_closed() {
+            cancel.cancel();
+        }
+        Ok(())
+    };
+    let mut summary = Summary::default();
+    let tracked = Live::connect(&endpoint, &paths, server.is_some())
+        .and_then(|live| live.run(&job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary }));
+    // What was tracked before an error is as good as the rest.
+    document.finish(&summary, tracked.as_ref().err())?;
+    let is_worth_saying = tracked.is_ok() || !summary.is_empty();
+    if is_worth_saying && !args.json.as_ref().is_some_and(Output::is_standard) {
+        out::print(&summary.text())?;
+    }
+    tracked?;
+    rerun_arg::finish(recorder, &cancel)
+}

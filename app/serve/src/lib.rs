@@ -1,0 +1,92 @@
+//! The workbench in a browser: the window is drawn here, and pages show it (protocol: docs/reference/browser.md).
+//!
+//! One thread owns egui's context and the [`Window`](handeye_ui::Window), as that of a desktop does ([`host`]). What it
+//! has drawn is a [`frame::Frame`]: triangles in chunks, and textures. Every page has a connection of its own
+//! ([`socket`]), which sends what changed since the frame that this page has ([`difference`]); a page that is slow gets
+//! fewer frames and holds nobody up. What a person does at a page comes back through the [`hub`], which knows who
+//! drives.
+
+mod access;
+mod archive;
+mod args;
+mod chunks;
+mod difference;
+mod frame;
+mod guesses;
+mod host;
+mod hub;
+mod input;
+mod memory;
+mod reading;
+mod site;
+mod socket;
+mod textures;
+mod upload;
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use anyhow::Context as _;
+
+use handeye_http::door::{Door, Limits};
+use handeye_ui::opening::Opening;
+use handeye_ui::signals::Signals;
+use handeye_workbench::app::{InBrowser, Reach};
+
+use access::Access;
+pub use args::ServeArgs;
+use host::Host;
+use hub::Hub;
+use site::Site;
+
+/// Threads that talk to browsers.
+const THREADS: usize = 2;
+
+/// What is held for browsers. A page has one connection that lasts and a few for files.
+const LIMITS: Limits = Limits {
+    connections: 64,
+    idle: std::time::Duration::from_secs(10),
+    stalled: std::time::Duration::from_secs(30),
+    // A recording that is uploaded comes within it, or not at all.
+    answer: std::time::Duration::from_mins(10),
+};
+
+/// Serves the workbench until it is asked to end. `announce` is told the address to open, once it can be.
+///
+/// # Errors
+/// When the port is taken or the address is none of this machine, and as for the window.
+pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
+    let ServeArgs { bind, port, allow, gui } = args;
+    let opening = Opening::read(gui)?;
+    let address = SocketAddr::new(bind, port);
+    let access = Access::of(bind)?;
+    let mut folders = vec![opening.sessions()];
+    folders.extend(opening.session().map(std::path::Path::to_path_buf));
+    folders.extend(allow);
+    let reach = Reach::new(folders).with_uploads(upload::folder(&opening.sessions())).with_drivers(opening.drivers());
+    let shown = InBrowser { reach, recording: Arc::default(), stop: Arc::default() };
+
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(THREADS)
+        .thread_name("browsers")
+        .enable_all()
+        .build()
+        .context("there are no threads to serve from")?;
+    let (hub, wakes) = Hub::new(Arc::clone(&shown.stop));
+    let hub = Arc::new(hub);
+    let site = Site::new(access, Arc::clone(&hub), shown.clone(), &opening.sessions());
+    let site = Arc::new(site);
+    let answering = Arc::clone(&site);
+    let door = Door::at(address, runtime.handle(), LIMITS, move |request| {
+        let site = Arc::clone(&answering);
+        async move { site.answer(request).await }
+    })
+    .with_context(|| format!("cannot listen at {address}"))?;
+    let signals = Signals::listen();
+    let host = Host::open(opening, shown, Arc::clone(&hub), wakes, signals)?;
+    announce(&site.url(door.address()));
+    host.run();
+    drop(door);
+    runtime.shutdown_background();
+    Ok(())
+}

@@ -1,5 +1,0 @@
-//! The calibration in other formats.
-
-pub(crate) mod pane;
-pub(crate) mod state;
-pub(crate) mod update;

@@ -1,5 +1,0 @@
-//! Boxes that the arm keeps out of, besides what the cell says stands around it: drawn in the 3D pane, kept in a file.
-
-pub(crate) mod pane;
-pub mod state;
-pub(crate) mod update;

@@ -1,7 +1,0 @@
-//! What the program says: log, toasts, the banner.
-
-pub(crate) mod banner;
-pub(crate) mod pane;
-pub(crate) mod state;
-pub(crate) mod toasts;
-pub(crate) mod update;

@@ -1,9 +1,0 @@
-//! The session: the thread that keeps it, its folder, undo and redo.
-
-pub(crate) mod archive;
-pub(crate) mod desk;
-pub(crate) mod dialog;
-pub(crate) mod facts;
-pub mod start;
-pub(crate) mod state;
-pub(crate) mod update;

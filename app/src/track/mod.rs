@@ -1,8 +1,0 @@
-//! The board from image to image, and the arm that follows it.
-
-pub(crate) mod follow_line;
-pub(crate) mod pane;
-pub(crate) mod state;
-pub(crate) mod trail;
-pub(crate) mod update;
-pub(crate) mod worker;

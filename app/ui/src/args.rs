@@ -1,0 +1,36 @@
+//! `handeye gui`, as the command line has it.
+
+use clap::Args;
+use handeye_cell::scene::SceneChoice;
+
+use handeye_workbench::arguments::{ObjectArgs, RerunArg, heading};
+
+/// Options of the workbench.
+#[derive(Debug, Args, Default)]
+pub struct GuiArgs {
+    /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
+    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
+    pub connect: Option<String>,
+    /// Scene of the built-in cell: reference, realistic, coppeliasim, tracking, panda, xarm6, or a scene file; as in the settings if not given.
+    #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["connect", "driver", "camera_driver"], help_heading = heading::CELL)]
+    pub scene: Option<SceneChoice>,
+    /// Driver of the robot, or of robot and camera: a command, or tcp://HOST:PORT.
+    #[arg(long, value_name = "DRIVER", conflicts_with = "connect", help_heading = heading::CELL)]
+    pub driver: Option<String>,
+    /// Driver of the camera, where it is another program; alone where you type the robot's poses.
+    #[arg(long, value_name = "DRIVER", conflicts_with = "connect", help_heading = heading::CELL)]
+    pub camera_driver: Option<String>,
+    /// Where its scene has the parts of the cell; as in the settings if not given.
+    #[command(flatten)]
+    pub objects: ObjectArgs,
+    /// File of boxes that the arm keeps out of, which is there and is written when they are changed; `keep_out.toml` beside the
+    /// settings if not given.
+    #[arg(long, value_name = "FILE", help_heading = heading::CELL)]
+    pub keep_out: Option<std::path::PathBuf>,
+    /// Session folder to open, or to create.
+    #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
+    pub session: Option<std::path::PathBuf>,
+    /// Where the recording goes; beside the session if not given.
+    #[command(flatten)]
+    pub rerun: RerunArg,
+}

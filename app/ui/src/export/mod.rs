@@ -1,0 +1,3 @@
+//! The calibration in other formats.
+
+pub(crate) mod pane;

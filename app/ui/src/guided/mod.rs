@@ -1,0 +1,5 @@
+//! Guided capture in the window: one button from the board in view to a calibration that was checked.
+
+pub(crate) mod pane;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,3 @@
+//! Other people's recordings become data sets and sessions.
+
+pub(crate) mod dialog;

@@ -1,0 +1,5 @@
+//! The live images: colour, depth, and what is drawn over them.
+
+pub(crate) mod colour_bar;
+pub(crate) mod pane;
+pub(crate) mod textures;

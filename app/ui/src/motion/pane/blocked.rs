@@ -1,0 +1,93 @@
+//! Why the arm cannot be moved now.
+
+use egui::Ui;
+
+use crate::style::parts;
+use crate::style::theme::Tone;
+use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::model::{ArmDoubt, Model, Moves, Simulation};
+use handeye_workbench::tr;
+
+/// Reasons in the language of the window.
+pub struct Blocked {
+    /// For every motion.
+    pub arm: Option<&'static str>,
+    /// For motions of the tip, which need the kinematics.
+    pub tip: Option<&'static str>,
+    can_start: bool,
+}
+
+impl Blocked {
+    /// What stands in the way now.
+    pub fn of(model: &Model) -> Self {
+        let language = model.view.language;
+        let resting = model.resting_simulation();
+        let arm = if !model.control.is_connected() || !model.mover.is_connected() {
+            Some(tr!(language, "Not connected: the arm cannot be moved until the connection is there"))
+        } else if let Some(simulation) = resting {
+            Some(match simulation {
+                Simulation::Paused => tr!(language, "The simulation is paused: the arm moves only while it runs"),
+                _ => tr!(language, "The simulation is stopped: the arm moves only while it runs"),
+            })
+        } else if model.robot.is_none() || model.cell.is_none() {
+            Some(tr!(language, "Waiting until the robot has been read"))
+        } else if model.sequence_runs {
+            Some(tr!(language, "A sequence is under way: stop it to move the arm yourself"))
+        } else if matches!(model.moves(), Moves::OnceArmed { .. }) && !model.is_armed() {
+            Some(tr!(language, "The robot is only read until you let the workbench move it, in Jog"))
+        } else {
+            None
+        };
+        let is_known = model.cell.as_ref().is_none_or(|cell| cell.arm.is_some());
+        let knows_kinematics = match model.moves() {
+            // The controller has its own.
+            Moves::OnceArmed { joints, tip } => tip || (joints && is_known),
+            Moves::Freely | Moves::Never => is_known,
+        };
+        let is_doubted = model.cell.as_ref().is_some_and(|cell| cell.arm_doubt.is_some());
+        let tip = arm.or_else(|| match knows_kinematics {
+            true => None,
+            false if is_doubted => unknown_arm(model),
+            false => Some(tr!(language, "This arm's kinematics is not known, so only its joints can be moved")),
+        });
+        Self { arm, tip, can_start: resting.is_some() }
+    }
+
+    /// The reason for everything, and what helps.
+    pub fn arm_ui(&self, ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+        // Where a person has to allow it, the question stands below.
+        let Some(reason) = self.arm.filter(|_| model.is_armed() || !model.control.is_connected()) else { return };
+        parts::notice_ui(ui, Tone::Warning, reason, |ui| {
+            if self.can_start && ui.button(tr!(model.view.language, "Run the simulation")).clicked() {
+                outbox.send(Command::StartSimulation);
+            }
+        });
+    }
+
+    /// The reason for motions of the tip alone.
+    pub fn tip_ui(&self, ui: &mut Ui) {
+        if let Some(reason) = self.tip.filter(|_| self.arm.is_none()) {
+            parts::hint_ui(ui, reason);
+        }
+    }
+}
+
+/// Why the arm's chain of joints is not known, so that nothing can be planned with it; `None` where it is.
+pub fn unknown_arm(model: &Model) -> Option<&'static str> {
+    let (cell, language) = (model.cell.as_ref(), model.view.language);
+    if cell.is_some_and(|cell| cell.arm.is_some()) {
+        return None;
+    }
+    Some(match cell.and_then(|cell| cell.arm_doubt) {
+        Some(ArmDoubt::Open) => tr!(
+            language,
+            "It is not known yet where the robot's joints begin and what tool it carries: let it stand at four places, each \
+             turned by 15° or more, about two axes"
+        ),
+        Some(ArmDoubt::Foreign { .. }) => tr!(
+            language,
+            "The robot's joints and poses do not agree: the log says how far they are apart, and what to do"
+        ),
+        None => tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"),
+    })
+}

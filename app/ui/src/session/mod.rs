@@ -1,0 +1,3 @@
+//! The session: the thread that keeps it, its folder, undo and redo.
+
+pub(crate) mod dialog;

@@ -1,0 +1,3 @@
+//! Taught poses, and the sequence that visits them.
+
+pub(crate) mod pane;

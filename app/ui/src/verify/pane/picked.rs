@@ -1,0 +1,77 @@
+//! A point of the image in the base, measured in two ways.
+
+use egui::Ui;
+use handeye_estimate::claim::Claim;
+use handeye_estimate::verify::MeasuredPoint;
+use nalgebra::Vector3;
+
+use crate::style::numbers;
+use crate::style::parts;
+use handeye_wording::text;
+use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::model::Model;
+use handeye_workbench::text::Text;
+use handeye_workbench::tr;
+
+/// The point, or how to pick one.
+pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    parts::section_ui(ui, tr!(language, "Picked point, in the base"));
+    let Some(picked) = &model.picked else {
+        parts::hint_ui(
+            ui,
+            tr!(
+                language,
+                "In the step Verify, click a point of the board in the live image. Its place in the base is then \
+                 measured twice: from the depth at the pixel, and from the board as it is seen."
+            ),
+        );
+        return;
+    };
+    ui.horizontal(|ui| {
+        let pixel = text!("Pixel {column}, {row}", column = picked.pixel.column, row = picked.pixel.row);
+        parts::hint_ui(ui, &pixel.say(language));
+        if ui.add(parts::small_button(ui, tr!(language, "Clear the point"))).clicked() {
+            outbox.send(Command::Pick(None));
+        }
+    });
+    point_ui(ui, model, tr!(language, "From depth [mm]"), &picked.from_depth);
+    point_ui(ui, model, tr!(language, "From the board [mm]"), &picked.from_board);
+    if let (Ok(depth), Ok(board)) = (&picked.from_depth, &picked.from_board) {
+        let difference_mm = (depth.in_base.point() - board.in_base.point()) * 1e3;
+        parts::stated_ui(ui, tr!(language, "Difference [mm]"), &millimetres(&difference_mm));
+        parts::stated_ui(ui, tr!(language, "Its length [mm]"), &numbers::fixed(difference_mm.norm(), 2, 8));
+    }
+    let solved = model.solve.solved.as_ref();
+    let modelled = solved.is_none_or(|solved| *solved.calibration.claim() == Claim::AsModelled);
+    let meaning = if modelled {
+        tr!(
+            language,
+            "± is one standard deviation, as far as the calibration causes it; what the image adds comes on top."
+        )
+    } else {
+        tr!(
+            language,
+            "± is one standard deviation by the noise alone: what was found in the calibration comes on top, see Solve."
+        )
+    };
+    parts::hint_ui(ui, meaning);
+}
+
+fn point_ui(ui: &mut Ui, model: &Model, caption: &str, point: &Result<MeasuredPoint, Text>) {
+    match point {
+        Err(why) => {
+            parts::row_ui(ui, caption, |ui| parts::hint_ui(ui, &why.say(model.view.language)));
+        }
+        Ok(point) => {
+            parts::stated_ui(ui, caption, &millimetres(&(point.in_base.point().coords * 1e3)));
+            if let Some(sigma_m) = point.sigma_m() {
+                parts::stated_ui(ui, "± 1 σ [mm]", &millimetres(&(sigma_m * 1e3)));
+            }
+        }
+    }
+}
+
+fn millimetres(vector: &Vector3<f64>) -> String {
+    numbers::row(vector.as_slice(), 2, 8)
+}

@@ -1,0 +1,48 @@
+//! Wakes the window from other threads.
+
+use std::io;
+use std::sync::Arc;
+use std::thread::Builder;
+use std::time::Duration;
+
+use crossbeam_channel::bounded;
+
+use handeye_workbench::worker::Waker;
+
+/// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
+const GATHER: Duration = Duration::from_millis(20);
+
+/// What has a window drawn. egui's own way to ask for it waits while text is laid out, which may take longer than an arm may
+/// go on: only a thread of its own waits there.
+///
+/// # Errors
+/// When the system has no more threads.
+pub fn waker_of(ctx: &egui::Context) -> io::Result<Waker> {
+    let (wake, wakes) = bounded(1);
+    let ctx = ctx.clone();
+    Builder::new().name("waker".to_owned()).spawn(move || {
+        for () in wakes {
+            ctx.request_repaint_after(GATHER);
+        }
+    })?;
+    Ok(Arc::new(move || {
+        // Full: it is going to ask anyway.
+        let _woken = wake.try_send(()).is_ok();
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_wakes_the_window_does_not_wait_while_it_lays_out_text() {
+        let ctx = egui::Context::default();
+        let waker = waker_of(&ctx).expect("a thread");
+        // As long as this runs, egui answers nobody else.
+        ctx.data_mut(|_locked| {
+            let woken = std::thread::spawn(move || (0..100).for_each(|_| waker()));
+            woken.join().expect("it does not wait for this");
+        });
+    }
+}

@@ -1,0 +1,404 @@
+//! The application without its window: the model, the workers, and the only two ways to change the model.
+//!
+//! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each part of the work has a file of
+//! its own here; all of them change the model of the one [`App`] and hand work to threads, and none waits.
+
+mod leave;
+mod reach;
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use handeye_coppeliasim::cell::CellPaths;
+use handeye_files::bounds::Bounds;
+
+use crate::command::{Command, Event, Outbox};
+use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
+use crate::rerun_log::{Pace, Recorder, RecorderOptions, Relay, RerunChoice, WebViewer};
+use crate::settings::SettingsWrite;
+use crate::worker::{Clock, Connector, FileTask, SessionThreads, StopLine, Waker, Workers};
+use handeye_wording::text;
+
+pub use reach::Reach;
+
+/// Makes what connects to a cell.
+pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Connector> + Send + Sync>;
+
+/// What an application begins with.
+pub struct Start {
+    /// Which cell.
+    pub source: CellSource,
+    /// What is remembered from one start to the next.
+    pub view: ViewSettings,
+    /// Addresses that were connected to before, newest first.
+    pub addresses: Vec<String>,
+    /// Drivers that were connected to before, newest first.
+    pub drivers: Vec<Drivers>,
+    /// Where a scene other than the built-in one has the parts of the cell.
+    pub objects: CellPaths,
+    /// Where the boxes that the arm keeps out of are kept; nowhere if not given.
+    pub keep_out: Option<PathBuf>,
+    /// Where new sessions go.
+    pub sessions: PathBuf,
+    /// A session or data set to open at once; where there is none, a session is begun there.
+    pub open: Option<PathBuf>,
+    /// Where the recording for Rerun goes.
+    pub rerun: RerunChoice,
+    /// What can be reached where the window is shown in browsers; nothing is then opened on the screen of this machine.
+    pub in_browser: Option<InBrowser>,
+}
+
+/// How a window is shown in browsers.
+#[derive(Clone)]
+pub struct InBrowser {
+    /// What can be reached from there.
+    pub reach: Reach,
+    /// Where the recording is found for the viewer that is shown beside it.
+    pub recording: Arc<Relay>,
+    /// What stops the arm, for the threads that listen to pages.
+    pub stop: Arc<StopLine>,
+}
+
+/// Model and workers.
+pub struct App {
+    pub(crate) model: Model,
+    /// The threads that talk to the cell; others take their place when another cell is chosen.
+    pub(crate) workers: Workers,
+    pub(crate) desk: SessionThreads,
+    pub(crate) connect: Connect,
+    pub(crate) clock: Clock,
+    pub waker: Waker,
+    pub(crate) numbers: Numbers,
+    /// The question that the solver was asked last.
+    pub(crate) asked: Option<crate::solve::question::Question>,
+    pub(crate) recorder: Recorder,
+    pub(crate) recorded: crate::rerun_log::recorded::Recorded,
+    /// Until when everything has to be over, once the application ends.
+    pub(crate) leave_by: Option<Instant>,
+    /// Stops of other threads that were taken note of.
+    pub(crate) outside_stops: u64,
+    /// What commands may reach, if not everything.
+    reach: Option<Reach>,
+}
+
+/// The last numbers that were given to requests.
+#[derive(Debug, Default)]
+pub(crate) struct Numbers {
+    pub(crate) capture: u64,
+    pub(crate) job: JobId,
+    pub(crate) motion: MotionId,
+    /// The motion that follows the board.
+    pub(crate) follow: Option<MotionId>,
+    /// The request for poses to verify at that is not answered yet.
+    pub(crate) plan: Option<MotionId>,
+    /// The request for a view for a person to bring about.
+    pub(crate) view: u64,
+    /// The request about a recording.
+    pub(crate) import: u64,
+}
+
+impl App {
+    /// Starts the workers; they connect by themselves.
+    ///
+    /// # Errors
+    /// When the system has no more threads, or the file of the recording cannot be made.
+    pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
+        let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, rerun, in_browser } = start;
+        let recorder = Recorder::start(RecorderOptions {
+            choice: rerun,
+            pace: Pace::Live,
+            beside_session: true,
+            web: in_browser.as_ref().map_or(WebViewer::Here, |shown| WebViewer::Relayed(Arc::clone(&shown.recording))),
+            waker: Arc::clone(&waker),
+        })?;
+        let desk = SessionThreads::start(sessions, &clock, &waker)?;
+        let stop = in_browser.as_ref().map(|shown| Arc::clone(&shown.stop)).unwrap_or_default();
+        let connector = connect(&source, &objects);
+        let workers = Workers::start(&source, &view, &connector, desk.captures(), &stop, &clock, &waker)?;
+        let sessions = desk.sessions().to_path_buf();
+        let shown = in_browser.is_some();
+        let model = Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
+        let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
+        let model = Model { keep_out, ..model };
+        let numbers = Numbers::default();
+        let recorded = crate::rerun_log::recorded::Recorded::default();
+        let mut app = Self {
+            model,
+            workers,
+            desk,
+            connect,
+            clock,
+            waker,
+            numbers,
+            asked: None,
+            recorder,
+            recorded,
+            leave_by: None,
+            outside_stops: 0,
+            reach: in_browser.map(|shown| shown.reach),
+        };
+        if let Some(fault) = fault {
+            app.say(Severity::Error, fault);
+        }
+        app.prepare_session();
+        app.send_target();
+        app.send_keep_out();
+        if let Some(folder) = open {
+            app.open_or_begin(folder);
+        }
+        Ok(app)
+    }
+
+    /// What the window shows.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Goes on from a model that a test has made up. The workers do not hear of it.
+    #[cfg(feature = "testing")]
+    pub fn replace_model(&mut self, model: Model) {
+        self.model = model;
+    }
+
+    /// Takes in what the workers have reported. Never waits for them.
+    pub fn collect(&mut self) {
+        self.take_outside_stops();
+        self.absorb(Event::Tick { now_s: (self.clock)() });
+        let mut events = Vec::new();
+        self.workers.drain(|event| events.push(event));
+        self.desk.drain(|event| events.push(event));
+        self.recorder.drain(|event| events.push(event));
+        for event in events {
+            self.absorb(event);
+        }
+        self.record_changes();
+    }
+
+    /// Applies the commands of a frame of the window.
+    pub fn apply_all(&mut self, outbox: &mut Outbox) {
+        for (command, place) in outbox.drain() {
+            tracing::trace!(?command, %place, "command");
+            self.apply(command);
+        }
+    }
+
+    /// What files in a folder that is opened may name: anything, where somebody sits at this machine.
+    pub(crate) fn bounds_of(&self, path: &Path) -> Bounds {
+        self.reach.as_ref().map_or(Bounds::ANYWHERE, |reach| reach.bounds_of(path))
+    }
+
+    /// Does what the user wants, or has a worker do it. Never waits for a worker.
+    pub fn apply(&mut self, command: Command) {
+        if let Some(why) = self.reach.as_ref().and_then(|reach| reach.refusal(&command)) {
+            self.say(Severity::Warning, why);
+            return;
+        }
+        match command {
+            Command::Stop => self.stop(),
+            Command::StartSimulation => self.start_simulation(),
+            Command::Reconnect => self.reconnect(),
+            Command::StopTrying => self.stop_trying(),
+            Command::Connect(source) => self.connect(source),
+            Command::Arm(on) => self.arm(on),
+            Command::TypePose(pose) => self.type_pose(Some(pose)),
+            Command::SetObjects(objects) => self.set_objects(objects),
+            Command::SetKeepOut(content) => self.set_keep_out(*content),
+            Command::ImportKeepOut(file) => self.import_keep_out(file),
+            Command::ExportKeepOut(file) => self.export_keep_out(file),
+            Command::PrintTarget(page) => self.print_target(page),
+
+            Command::SetTheme(theme) => self.model.view.theme = theme,
+            Command::SetLanguage(language) => self.model.view.language = language,
+            Command::SetRotationFormat(format) => self.model.view.rotation = format,
+            Command::SetDepthScale(scale) => self.set_depth_scale(scale),
+            Command::SetDepthColours(colours) => self.set_depth_colours(colours),
+            Command::SetOverlays(overlays) => self.model.view.overlays = overlays,
+            Command::SetViewport(viewport) => self.model.viewport = viewport,
+            Command::SetSceneView(view) => self.model.scene = view,
+            Command::PointAt(point) => self.model.cursor = point,
+            Command::Pick(pixel) => self.pick(pixel),
+            Command::GoToStep(step) => self.model.step = step,
+            Command::SetDialog(dialog) => self.set_dialog(dialog),
+            Command::DismissMessage(number) => self.model.messages.dismiss(number),
+            // Where panes are is the window's business.
+            Command::ShowPane(_) | Command::ResetLayout => {}
+
+            Command::Move { goal, what } => self.start_motion(goal, what),
+            Command::Jog(jog) => self.jog(jog),
+            Command::JogHeld(jog) => self.hold_jog(jog),
+            Command::JogReleased => self.release_jog(),
+            Command::SetJog(settings) => self.model.view.jog = settings,
+            Command::Teach { name } => self.teach(name),
+            Command::RemoveTaught(name) => self.remove_taught(&name),
+            Command::RenameTaught { from, to } => self.rename_taught(&from, &to),
+            Command::ReorderTaught { name, to } => self.reorder_taught(&name, to),
+            Command::TeachReference => self.teach_reference(),
+            Command::ImportTaught(file) => self.import_taught(file),
+            Command::ExportTaught(file) => self.export_taught(file),
+            Command::AdoptTaught => self.adopt_taught(),
+            Command::GoToTaught(name) => self.visit_taught(&name),
+            Command::GoToCapture(id) => self.go_to_capture(id),
+            Command::RunSequence { purpose } => self.run_sequence(purpose),
+            Command::ContinueSequence => self.continue_sequence(),
+            Command::GoHome => self.go_home(),
+            Command::ResetCell => self.reset_cell(),
+            Command::CalibrateForMe => self.calibrate_for_me(),
+            Command::ConfirmMove => self.confirm_move(),
+            Command::SkipMove => self.skip_move(),
+            Command::SetConfirmMoves(confirm) => self.set_confirm_moves(confirm),
+            Command::GuideByHand => self.guide_by_hand(),
+            Command::SkipView => self.skip_view(),
+            Command::StopGuiding => self.stop_guiding(),
+            Command::VerifyAtPlanned => self.plan_verification(),
+            Command::StopSequence => self.stop_sequence(),
+
+            Command::Capture(purpose) => self.capture(purpose, None),
+            Command::CancelCapture => self.cancel_capture(),
+            Command::SetCaptureOptions(options) => self.model.view.capture = options,
+            Command::Select(ids) => self.select(ids),
+            Command::BackToLive => self.back_to_live(),
+
+            Command::SetExcluded { ids, excluded } => self.set_excluded(ids, excluded),
+            Command::SetPurpose { ids, purpose } => self.set_purpose(ids, purpose),
+            Command::Delete(ids) => self.delete(ids),
+            Command::Undo => self.undo(),
+            Command::Redo => self.redo(),
+            Command::SetTarget(target) => self.set_target(target),
+            Command::SetMode(mode) => self.set_mode(mode),
+            Command::SetCamera(camera) => self.set_camera(camera),
+            Command::NewSession(folder) => self.new_session(folder),
+            Command::Open(folder) => self.open(folder),
+            Command::OpenSample => self.open_sample(),
+            Command::SetImportTarget(typed) => self.set_import_target(typed),
+            Command::SetImportTime(seconds) => self.set_import_time(seconds),
+            Command::FixConvention { key, value } => self.fix_convention(key, value),
+            Command::ChooseHypothesis(place) => self.choose_hypothesis(place),
+            Command::ConvertRecording => self.convert_recording(),
+            Command::ConvertImages => self.convert_images(),
+            Command::SaveAs(folder) => self.save_as(folder),
+            Command::ListFolder(folder) => self.list_folder(folder),
+            Command::OpenFolder(folder) => self.open_folder(folder),
+
+            Command::Solve => self.solve_again(),
+            Command::CancelSolve => self.cancel_solve(),
+            Command::SetMethod(name) => self.set_method(&name),
+            Command::SetKeepOutliers(keep) => self.set_keep_outliers(keep),
+            Command::SetTipBox(chosen) => self.set_tip_box(chosen),
+            Command::SetGoal(goal) => self.set_goal(goal),
+            Command::SetOutlierLine(line_px) => self.model.outlier_line_px = line_px,
+
+            Command::SetTracking(on) => self.set_tracking(on),
+            Command::SetFollow(wish) => self.set_follow(wish),
+            Command::MoveBoard(motion) => self.move_board(motion),
+            Command::HideBoard(hidden) => self.hide_board(hidden),
+            Command::OpenRerun => self.open_rerun(),
+
+            Command::ChooseFormats(formats) => self.model.export.chosen = formats,
+            Command::ShowFormat(format) => self.model.export.shown = format,
+            Command::SetExportNames(names) => self.set_export_names(names),
+            Command::SetExportFolder(folder) => self.model.export.folder = folder,
+            Command::Export => self.export(),
+        }
+    }
+
+    /// Takes in what happened.
+    pub fn absorb(&mut self, event: Event) {
+        self.record(&event);
+        match event {
+            Event::Tick { now_s } => {
+                self.model.now_s = now_s;
+                self.keep_keep_out(false);
+                self.stop_waits();
+            }
+            Event::Standing(standing) => self.standing_found(standing),
+            Event::KeepOutRead(content) => self.keep_out_read(*content),
+            Event::Link { link, state } => self.link_changed(link, state),
+            Event::Robot(robot) => {
+                self.model.trail.add(robot.base_from_tip.translation().into());
+                self.stop_seen(&robot);
+                if !robot.joints_rad.is_empty() {
+                    self.model.home.get_or_insert(robot.joints_rad);
+                }
+                self.model.robot = Some(robot);
+                self.model.robot_read_s = Some(self.model.now_s);
+            }
+            Event::NoRobot => self.model.robot = None,
+            Event::Cell(facts) => self.cell_found(*facts),
+            Event::Heard { severity, words } => self.heard(severity, words),
+            Event::Stopped => self.stopped(),
+            Event::Frame { info, dropped, images } => {
+                self.model.dropped_frames = dropped;
+                // A frame out of a log has no pixels, and nothing to show.
+                if let Some(images) = images {
+                    self.model.frame = Some(LiveFrame { info, images });
+                }
+            }
+            Event::Detection(detection) => {
+                if detection.corners.is_some() {
+                    self.model.board_seen_s = Some(self.model.now_s);
+                }
+                self.model.detection = Some(*detection);
+                self.look_by_hand();
+            }
+            Event::Moved { id, outcome } => self.moved(id, outcome),
+            Event::Guided { id, outcome } => self.guided_chosen(id, outcome),
+            Event::ViewChosen { number, choice } => self.view_chosen(number, *choice),
+            Event::Planned { id, views } => self.planned(id, views),
+            Event::JogEnded { why } => self.jog_ended(why),
+            Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
+            Event::CaptureRefused { number, refused } => self.capture_refused(number, refused),
+            Event::Captured { number, id } => {
+                self.captured(number, id);
+                self.forget_typed_pose();
+            }
+            Event::Document(state) => self.document_changed(*state),
+            Event::SessionOpened { exported } => self.session_opened(exported),
+            Event::SessionFailed { why } => self.session_failed(why),
+            Event::NoSession(path) => self.import(path),
+            Event::ImportProgress { number, work } => self.import_progress(number, work),
+            Event::RecordingLooked { number, found, trouble } => self.recording_looked(number, found, trouble),
+            Event::RecordingConverted { number, converted } => self.recording_converted(number, converted),
+            Event::Observed { id, target, observed } => self.observed(id, target, observed),
+            Event::Review { id, images } => self.reviewed(id, images),
+            Event::Folder(listing) => self.model.folder = Some(listing),
+            Event::Recent(recent) => self.model.recent = recent,
+            Event::PosesRead { poses } => self.poses_read(poses),
+            Event::SolveProgress { job, stage, part } => self.solve_progress(job, stage, part),
+            Event::SolveEnded { job, outcome } => self.solve_ended(job, outcome),
+            Event::Previews(previews) => self.model.export.previews = previews.into_iter().collect(),
+            Event::Exported(written) => self.written(written),
+            Event::Tracked(tracked) => self.tracked(tracked),
+            Event::TrackFailed { why } => self.track_failed(why),
+            Event::Follow(status) => self.follow_goes(status),
+            Event::Rerun(state) => self.model.rerun = state,
+            Event::NoBrowser => self.show_rerun_address(),
+            Event::Notice { severity, text } => self.say(severity, text),
+        }
+        self.guided_step();
+        self.guided_by_hand_step();
+        self.fit_scene();
+    }
+
+    /// Has the settings written.
+    pub fn write_settings(&mut self, settings: SettingsWrite) {
+        let asked = self.desk.files(FileTask::Settings(settings));
+        self.expect(text!("The settings were not written"), asked);
+    }
+
+    /// Tells the user when a worker did not take a request.
+    pub(crate) fn expect<Refused>(&mut self, failure: handeye_wording::Text, asked: Result<(), Refused>) {
+        if let Err(_refused) = asked {
+            let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
+            self.say(Severity::Warning, text);
+        }
+    }
+}
+
+#[cfg(test)]
+mod motion_tests;
+#[cfg(test)]
+mod reasons_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,215 @@
+//! What moves the arm, and what has to be asked first.
+
+use handeye_cell::scene::{SceneChoice, ShippedScene};
+use handeye_dataset::taught_poses::{Goal, TaughtPose};
+
+use super::tests::{bench, said};
+use super::*;
+use crate::model::{CapturePurpose, Drivers, JointFacts, Motion, MotionOutcome, Moves, StopOutcome};
+use crate::testing::sample;
+use crate::text::Language;
+use crate::worker::fake::FakeCell;
+
+/// Connected to the source, with two poses that were taught there.
+fn taught_at(source: CellSource) -> Model {
+    let mut model = sample::connected();
+    model.source = source;
+    let cell = model.taught_on(model.document().meta.target);
+    let pose = |name: &str, turned| TaughtPose {
+        cell: cell.clone(),
+        ..TaughtPose::new(name, Goal::Joints(vec![turned, 0.5, -1.0, 0.0, 1.5, 0.0]))
+    };
+    let poses = vec![pose("left", 1.1), pose("right", -0.9)];
+    Arc::make_mut(&mut model.session.document).taught = poses;
+    model
+}
+
+fn scene(scene: ShippedScene) -> CellSource {
+    CellSource::BuiltIn(SceneChoice::Shipped(scene))
+}
+
+fn driver() -> CellSource {
+    CellSource::Drivers(Drivers { robot: Some("python3 my_robot.py".to_owned()), camera: None })
+}
+
+#[test]
+fn poses_that_were_taught_on_another_cell_are_not_sent_to_the_arm_that_is_there() {
+    let taught = taught_at(scene(ShippedScene::Reference));
+    assert_eq!(taught.taught().len(), 2);
+    let others: [fn(&mut Model); 5] = [
+        |model| model.source = scene(ShippedScene::Xarm6),
+        |model| model.source = CellSource::Address("tcp://127.0.0.1:23000".to_owned()),
+        |model| model.source = driver(),
+        |model| {
+            let joints = &mut model.cell.as_mut().expect("connected").joints;
+            joints.push(JointFacts { range: None, ..joints[0] });
+        },
+        |model| model.cell = None,
+    ];
+    for other in others {
+        let mut model = taught.clone();
+        other(&mut model);
+        assert!(model.taught().is_empty());
+        let mut bench = bench(&FakeCell::new(0));
+        bench.app.replace_model(model);
+        bench.app.apply(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+        assert!(!bench.app.model().sequence_runs);
+        bench.app.apply(Command::GoToTaught("left".to_owned()));
+        assert_eq!(bench.app.model().motion, Motion::Idle);
+        assert_eq!(bench.app.model().asked, None);
+    }
+    assert!(taught.document().taught.len() == 2, "they stay in the session");
+}
+
+#[test]
+fn a_session_begins_with_the_reference_poses_for_the_arm_they_are_meant_for_alone() {
+    let model = sample::connected();
+    assert!(model.has_reference_poses(), "the sample is the UR5 of the simulator");
+    let mut driven = model.clone();
+    driven.cell.as_mut().expect("connected").moves = Moves::OnceArmed { joints: true, tip: true };
+    assert!(!driven.has_reference_poses(), "the same arm of somebody else stands elsewhere");
+    let mut unknown = model;
+    unknown.cell = None;
+    assert!(!unknown.has_reference_poses());
+}
+
+#[test]
+fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(taught_at(driver()));
+    // Whoever switched this off did so for moves that were seen before.
+    app.apply(Command::SetConfirmMoves(false));
+    app.apply(Command::RunSequence { purpose: None });
+    let asked = app.model().asked.clone().expect("the first move waits");
+    assert_eq!(app.model().motion, Motion::Idle);
+    assert_eq!(asked.what.say(Language::English), "pose left");
+
+    app.apply(Command::ConfirmMove);
+    assert!(matches!(app.model().motion, Motion::Moving { .. }));
+    let id = app.numbers.motion;
+    app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
+    assert!(app.model().asked.is_none(), "the second goes by itself");
+    assert!(matches!(app.model().motion, Motion::Moving { .. }));
+
+    app.apply(Command::Stop);
+    app.apply(Command::ContinueSequence);
+    assert!(app.model().asked.is_some(), "whatever happened meanwhile");
+    app.apply(Command::Stop);
+    assert_eq!(app.model().asked, None);
+    app.apply(Command::ConfirmMove);
+    assert!(!app.model().sequence_runs, "nothing begins after a stop");
+
+    app.apply(Command::RunSequence { purpose: None });
+    app.apply(Command::SkipMove);
+    let sequence = app.model().sequence.as_ref().expect("a sequence");
+    assert!(matches!(sequence.outcomes[..], [StopOutcome::Skipped(_)]));
+    assert!(app.model().asked.is_some(), "the next one is asked for instead");
+}
+
+#[test]
+fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    let mut model = sample::solved();
+    model.source = driver();
+    app.replace_model(model);
+    app.apply(Command::VerifyAtPlanned);
+    let id = app.numbers.motion;
+    app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
+    assert!(app.model().asked.is_some() && app.model().sequence_runs);
+    app.apply(Command::Stop);
+
+    let mut robot = app.model().robot.clone().expect("connected");
+    app.absorb(Event::Robot(robot.clone()));
+    app.apply(Command::GoHome);
+    assert_eq!(app.model().asked, None, "it is there");
+    robot.joints_rad[0] += 0.7;
+    app.absorb(Event::Robot(robot));
+    let id = app.numbers.motion;
+    app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
+    app.apply(Command::GoHome);
+    let asked = app.model().asked.clone().expect("it waits");
+    let way = crate::motion::way::Way::to(&asked.goal, app.model()).expect("connected");
+    assert!(way.joint.is_some_and(|(joint, far)| joint == 0 && (far - 0.7).abs() < 1e-9));
+    assert!(way.said(app.model()).say(Language::English).contains("the joint that moves most is J1, by 40.1°"));
+    app.apply(Command::SkipMove);
+    assert_eq!((&app.model().motion, &app.model().asked), (&Motion::Idle, &None));
+
+    let first = app.model().document().captures[0].id;
+    app.apply(Command::GoToCapture(first));
+    assert!(app.model().asked.is_some());
+    app.apply(Command::ConfirmMove);
+    assert!(matches!(app.model().motion, Motion::Moving { .. }));
+}
+
+#[test]
+fn a_built_in_cell_asks_nothing_unless_somebody_wants_it() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(taught_at(scene(ShippedScene::Reference)));
+    app.apply(Command::RunSequence { purpose: None });
+    assert!(matches!(app.model().motion, Motion::Moving { .. }));
+    app.apply(Command::Stop);
+    app.apply(Command::SetConfirmMoves(true));
+    app.apply(Command::RunSequence { purpose: None });
+    assert!(app.model().asked.is_some());
+}
+
+#[test]
+fn another_cell_has_no_move_that_waits_and_another_home() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    app.replace_model(taught_at(driver()));
+    app.absorb(Event::Robot(app.model().robot.clone().expect("connected")));
+    app.apply(Command::RunSequence { purpose: None });
+    assert!(app.model().asked.is_some() && app.model().home.is_some());
+    app.apply(Command::Connect(CellSource::Address("tcp://127.0.0.1:9".to_owned())));
+    assert_eq!((&app.model().asked, app.model().home), (&None, None));
+}
+
+/// A driver that says `done` to `stop` and goes on: what the states say counts.
+#[test]
+fn an_arm_is_said_to_be_stopped_when_its_states_say_so_and_an_alarm_has_the_number_otherwise() {
+    for goes_on in [false, true] {
+        let mut bench = bench(&FakeCell::new(0));
+        let app = &mut bench.app;
+        app.replace_model(taught_at(driver()));
+        let mut robot = app.model().robot.clone().expect("connected");
+        app.apply(Command::Stop);
+        app.absorb(Event::Stopped);
+        assert!(app.model().stop_pending && !said(app).contains("stays where it is"), "{}", said(app));
+        for i in 1..=22 {
+            let now_s = app.model().now_s + 0.1;
+            robot.sim_time_s += 0.1;
+            let turned: f64 = if goes_on || i < 4 { 34.9 - 4.0 * f64::from(i) } else { 20.0 };
+            robot.joints_rad[0] = turned.to_radians();
+            app.absorb(Event::Robot(robot.clone()));
+            app.absorb(Event::Tick { now_s });
+        }
+        assert!(!app.model().stop_pending);
+        let newest = app.model().messages.newest().expect("said").clone();
+        if goes_on {
+            assert_eq!(newest.severity, Severity::Error);
+            assert!(
+                said(app).contains("joint 1 from 5.7° to −") && said(app).contains("emergency stop"),
+                "{}",
+                said(app)
+            );
+        } else {
+            assert_eq!(said(app), "Arm stopped: every joint stays where it is");
+        }
+    }
+}
+
+#[test]
+fn without_states_nobody_says_that_the_arm_stands() {
+    let mut bench = bench(&FakeCell::new(0));
+    let app = &mut bench.app;
+    let mut model = taught_at(driver());
+    model.cell.as_mut().expect("connected").moves = Moves::OnceArmed { joints: true, tip: true };
+    app.replace_model(model);
+    app.absorb(Event::Stopped);
+    app.absorb(Event::Tick { now_s: app.model().now_s + 2.5 });
+    assert!(said(app).contains("it is not known whether it has"), "{}", said(app));
+}

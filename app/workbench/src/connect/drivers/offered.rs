@@ -1,0 +1,312 @@
+//! The drivers that come with the program, with what each has to be told; and their command lines.
+
+use std::collections::BTreeMap;
+
+use handeye_arm::ArmKind;
+use handeye_cell::scene::ShippedScene;
+use handeye_driver::DriverSpec;
+
+use crate::text::Language;
+use crate::tr;
+
+/// What the values of fields are, by option; those that are not given are not in it.
+pub type Values = BTreeMap<&'static str, String>;
+
+/// For what a driver is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The robot, and its camera where the driver has one.
+    Robot,
+    /// The camera alone.
+    Camera,
+}
+
+/// A driver that comes with the program.
+#[derive(Debug)]
+pub struct Offered {
+    /// Its subcommand of `handeye driver`.
+    pub name: &'static str,
+    /// For what it can be chosen.
+    parts: &'static [Part],
+    /// What it is always told where it is the camera alone.
+    pub camera_alone: &'static [&'static str],
+    /// What it can be told.
+    pub fields: &'static [Field],
+}
+
+/// Something that a driver can be told.
+#[derive(Debug)]
+pub struct Field {
+    /// The option; empty for an argument without one.
+    pub option: &'static str,
+    /// What is entered.
+    pub kind: FieldKind,
+    /// Whether it is of use for a camera alone.
+    pub for_camera: bool,
+    /// How soon it is looked for.
+    pub rank: Rank,
+}
+
+/// What is entered into a field.
+#[derive(Debug, Clone, Copy)]
+pub enum FieldKind {
+    /// A text, such as this one; the default where there is one.
+    Text(&'static str),
+    /// One of some words.
+    Word(fn() -> Vec<&'static str>),
+    /// On or off.
+    Switch,
+}
+
+/// How soon a field is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rank {
+    /// Nothing goes without it.
+    Needed,
+    /// Usually set.
+    Usual,
+    /// Under *More options*.
+    More,
+}
+
+const fn field(option: &'static str, kind: FieldKind, rank: Rank) -> Field {
+    Field { option, kind, for_camera: true, rank }
+}
+
+const fn robot_field(option: &'static str, kind: FieldKind, rank: Rank) -> Field {
+    Field { option, kind, for_camera: false, rank }
+}
+
+use FieldKind::{Switch, Text, Word};
+use Rank::{More, Needed, Usual};
+
+/// All of them, in the order of the list.
+pub static ALL: &[Offered] = &[
+    Offered {
+        name: "ur-rtde",
+        parts: &[Part::Robot],
+        camera_alone: &[],
+        fields: &[
+            robot_field("--host", Text("192.168.0.10"), Needed),
+            robot_field("--port", Text("30004"), Usual),
+            robot_field("--arm", Word(|| ArmKind::ALL.into_iter().map(ArmKind::name).collect()), Usual),
+            robot_field("--frequency", Text("125"), More),
+        ],
+    },
+    Offered {
+        name: "rosbridge",
+        parts: &[Part::Robot, Part::Camera],
+        camera_alone: &[],
+        fields: &[
+            field("--url", Text("ws://127.0.0.1:9090"), Usual),
+            robot_field("--base-frame", Text("base_link"), Usual),
+            robot_field("--tip-frame", Text("tool0"), Usual),
+            field("--image", Text("/camera/image_raw"), Usual),
+            field("--camera-info", Text("/camera/camera_info"), Usual),
+            field("--rectified", Switch, More),
+            field("--depth", Text("/camera/depth"), More),
+            robot_field("--joints", Text("/joint_states"), More),
+            robot_field("--joint-names", Text("joint_1,joint_2,…"), More),
+            robot_field("--urdf", Text("robot.urdf"), More),
+            field("--image-rate", Text("10"), More),
+            field("--fragment-size", Text("1000000"), More),
+        ],
+    },
+    #[cfg(target_os = "linux")]
+    Offered {
+        name: "v4l",
+        parts: &[Part::Camera],
+        camera_alone: &[],
+        fields: &[
+            field("--device", Text("/dev/video0"), Usual),
+            field("--size", Text("1280x720"), Usual),
+            field("--format", Word(|| vec!["RGB3", "YUYV", "GREY", "MJPG"]), More),
+            field("--rate", Text("30"), More),
+        ],
+    },
+    Offered {
+        name: "folder",
+        parts: &[Part::Robot, Part::Camera],
+        camera_alone: &["--images-only"],
+        fields: &[
+            field("", Text("/home/me/captures"), Needed),
+            robot_field("--length-unit", Word(|| vec!["m", "mm"]), Usual),
+            robot_field(
+                "--rotation",
+                Word(|| vec!["quaternion_xyzw", "quaternion_wxyz", "rotation_vector", "rpy", "matrix"]),
+                Usual,
+            ),
+            robot_field("--angle-unit", Word(|| vec!["rad", "deg"]), Usual),
+            robot_field("--pose", Word(|| vec!["base_from_tip", "tip_from_base"]), Usual),
+            robot_field("--poses", Text("poses.csv"), More),
+            robot_field("--joints", Text("6"), More),
+            robot_field("--joint-unit", Word(|| vec!["rad", "deg"]), More),
+            field("--size", Text("1280x720"), More),
+            field("--hold", Text("2"), More),
+        ],
+    },
+    Offered {
+        name: "fake",
+        parts: &[Part::Robot],
+        camera_alone: &[],
+        fields: &[
+            robot_field("--scene", Word(|| ShippedScene::ALL.into_iter().map(ShippedScene::name).collect()), Usual),
+            robot_field("--seed", Text("1"), Usual),
+            robot_field("--connect", Text("tcp://127.0.0.1:23000"), More),
+            robot_field("--only", Word(|| vec!["robot", "camera"]), More),
+            robot_field("--clock", Text("0"), More),
+        ],
+    },
+];
+
+/// Those for a part of the cell.
+pub fn of_part(part: Part) -> impl Iterator<Item = &'static Offered> {
+    ALL.iter().filter(move |offered| offered.parts.contains(&part))
+}
+
+/// Which of them a command line starts, and with which values; `None` for another program, and for one of them that is told
+/// something else than there are fields for.
+pub fn parse(command: &str, part: Part) -> Option<(&'static Offered, Values)> {
+    let Ok(DriverSpec::Command(words)) = command.parse() else { return None };
+    let [program, driver, name, told @ ..] = words.as_slice() else { return None };
+    let offered = of_part(part).find(|offered| offered.name == name)?;
+    if program != PROGRAM || driver != "driver" {
+        return None;
+    }
+    let always = offered.always(part);
+    if !always.iter().all(|word| told.iter().any(|other| other == word)) {
+        return None;
+    }
+    let mut values = Values::new();
+    let mut rest = told.iter().filter(|word| !always.contains(&word.as_str()));
+    while let Some(word) = rest.next() {
+        let (option, value) = match word.split_once('=') {
+            Some((option, value)) if word.starts_with("--") => (option, Some(value)),
+            _ if word.starts_with("--") => (word.as_str(), None),
+            _ => ("", Some(word.as_str())),
+        };
+        let field = offered.fields_of(part).find(|field| field.option == option)?;
+        let value = match (field.kind, value) {
+            (Switch, None) => ON.to_owned(),
+            (Switch, Some(_)) => return None,
+            (_, Some(value)) => value.to_owned(),
+            (_, None) => rest.next()?.clone(),
+        };
+        if values.insert(field.option, value).is_some() {
+            return None;
+        }
+    }
+    Some((offered, values))
+}
+
+/// The program that drivers are started with: this one.
+const PROGRAM: &str = "handeye";
+/// The value of a switch that is on.
+pub const ON: &str = "on";
+
+impl Offered {
+    /// The fields for a part of the cell.
+    pub fn fields_of(&self, part: Part) -> impl Iterator<Item = &'static Field> {
+        self.fields.iter().filter(move |field| part == Part::Robot || field.for_camera)
+    }
+
+    fn always(&self, part: Part) -> &'static [&'static str] {
+        match part {
+            Part::Robot => &[],
+            Part::Camera => self.camera_alone,
+        }
+    }
+
+    /// The command line with these values; `None` while one is missing that nothing goes without.
+    pub fn command(&self, part: Part, values: &Values) -> Option<String> {
+        let mut words = vec![PROGRAM.to_owned(), "driver".to_owned(), self.name.to_owned()];
+        for field in self.fields_of(part) {
+            let value = values.get(field.option).map(|value| value.trim()).filter(|value| !value.is_empty());
+            match (value, field.kind) {
+                (None, _) if field.rank == Needed => return None,
+                (None, _) => {}
+                (Some(_), Switch) => words.push(field.option.to_owned()),
+                (Some(value), _) if field.option.is_empty() => words.push(value.to_owned()),
+                // In one word a value that begins with a hyphen is no option.
+                (Some(value), _) if value.starts_with('-') => words.push(format!("{}={value}", field.option)),
+                (Some(value), _) => words.extend([field.option.to_owned(), value.to_owned()]),
+            }
+        }
+        words.extend(self.always(part).iter().map(|&word| word.to_owned()));
+        Some(DriverSpec::Command(words).to_string())
+    }
+
+    /// What it is called in the list.
+    pub fn title(&self, language: Language) -> &'static str {
+        match self.name {
+            "ur-rtde" => tr!(language, "Universal Robots (RTDE)"),
+            "rosbridge" => tr!(language, "ROS 1 or ROS 2 (rosbridge)"),
+            "v4l" => tr!(language, "USB camera (Video4Linux)"),
+            "folder" => tr!(language, "Folder that images are saved in"),
+            _ => tr!(language, "Simulated robot and camera"),
+        }
+    }
+
+    /// What there is to know of it.
+    pub fn about(&self, part: Part, language: Language) -> &'static str {
+        match (self.name, part) {
+            ("ur-rtde", _) => tr!(
+                language,
+                "Reads the controller; it does not move the arm. Which arm it is the controller does not say: choose it to have \
+                 the arm drawn."
+            ),
+            ("rosbridge", Part::Robot) => tr!(
+                language,
+                "Reads robot and camera; it does not move the arm. Without frames and images it lists the frames of tf in Log."
+            ),
+            ("rosbridge", Part::Camera) => tr!(language, "Reads the images of one topic."),
+            ("v4l", _) => tr!(language, "Switch autofocus off before the first capture."),
+            ("folder", Part::Robot) => tr!(
+                language,
+                "Shows each new image with its pose. How poses are written is said here or in the folder's dataset.toml."
+            ),
+            ("folder", Part::Camera) => tr!(language, "Shows each new image."),
+            _ => tr!(language, "To try the window with a driver: nothing real is connected."),
+        }
+    }
+}
+
+impl Field {
+    /// Its name.
+    pub fn label(&self, language: Language) -> &'static str {
+        match self.option {
+            "--host" | "--url" => tr!(language, "Address"),
+            "--port" => tr!(language, "Port"),
+            "--arm" => tr!(language, "Arm"),
+            "--frequency" => tr!(language, "States per second"),
+            "--base-frame" => tr!(language, "Base frame"),
+            "--tip-frame" => tr!(language, "Tip frame"),
+            "--image" => tr!(language, "Image topic"),
+            "--camera-info" => tr!(language, "Camera info topic"),
+            "--rectified" => tr!(language, "Images are rectified"),
+            "--depth" => tr!(language, "Depth topic"),
+            "--joints" if matches!(self.kind, Text("6")) => tr!(language, "Joints per row"),
+            "--joints" => tr!(language, "Joint state topic"),
+            "--joint-names" => tr!(language, "Joint names"),
+            "--urdf" => tr!(language, "URDF file"),
+            "--image-rate" | "--rate" => tr!(language, "Images per second"),
+            "--fragment-size" => tr!(language, "Fragments [bytes]"),
+            "--device" => tr!(language, "Device"),
+            "--size" => tr!(language, "Image size [px]"),
+            "--format" => tr!(language, "Pixel format"),
+            "" => tr!(language, "Folder"),
+            "--length-unit" => tr!(language, "Length unit"),
+            "--rotation" => tr!(language, "Rotation"),
+            "--angle-unit" => tr!(language, "Angle unit"),
+            "--pose" => tr!(language, "Poses are"),
+            "--poses" => tr!(language, "Table of poses"),
+            "--joint-unit" => tr!(language, "Joint unit"),
+            "--hold" => tr!(language, "Show each for [s]"),
+            "--scene" => tr!(language, "Scene"),
+            "--seed" => tr!(language, "Seed"),
+            "--connect" => tr!(language, "Running cell"),
+            "--only" => tr!(language, "One part alone"),
+            _ => tr!(language, "Clock begins at [s]"),
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! The way of a stop to the arm, for every thread.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crossbeam_channel::Sender;
+
+use super::worker::ControlTask;
+use crate::motion::desk::MotionQueue;
+use crate::motion::grip::Grip;
+use crate::worker::{Clock, Request};
+
+/// Stops the arm from any thread. Nothing in here waits: a stop is a count that the control worker looks at before anything
+/// else, and it stays ahead until the arm has been stopped, over every connection and every cell.
+///
+/// A stop that does not come from the thread that draws is ahead of what that thread still does: what a person asked for
+/// before it, and a sequence that goes on by itself. Until that thread has taken note of the stop, nothing that moves
+/// begins.
+#[derive(Default)]
+pub struct StopLine {
+    pressed: AtomicU64,
+    done: AtomicU64,
+    /// Stops that other threads pressed than the one that draws.
+    outside: AtomicU64,
+    /// How many of these the thread that draws has taken note of.
+    noted: AtomicU64,
+    ends: Mutex<Option<Ends>>,
+    grip: Arc<Grip>,
+}
+
+/// What a stop reaches in the cell that is worked with.
+pub struct Ends {
+    pub desk: Arc<MotionQueue>,
+    pub control: Sender<Request<ControlTask>>,
+    pub clock: Clock,
+}
+
+impl StopLine {
+    /// What a person holds down at a page.
+    pub fn grip(&self) -> &Arc<Grip> {
+        &self.grip
+    }
+
+    /// Asks for a stop. What this program moves ends at once, and nothing is left that could begin afterwards.
+    pub fn press(&self) {
+        self.pressed.fetch_add(1, Ordering::AcqRel);
+        if let Some(ends) = self.ends().as_ref() {
+            ends.desk.cancel((ends.clock)());
+            // Only to wake a resting worker: one that is too busy to take it looks at the line by itself.
+            let _full = ends.control.try_send(Request::Do(ControlTask::CheckStop)).is_err();
+        }
+    }
+
+    /// The same from a thread that does not draw; returns the number that [`Self::note`] takes.
+    pub fn press_outside(&self) -> u64 {
+        let number = self.outside.fetch_add(1, Ordering::AcqRel) + 1;
+        self.press();
+        number
+    }
+
+    /// The same when this program moves the arm; motions of others are none of its business.
+    pub fn press_if_moving(&self) {
+        let is_moving = self.ends().as_ref().is_some_and(|ends| ends.desk.is_busy((ends.clock)()));
+        if is_moving {
+            self.press_outside();
+        }
+    }
+
+    /// How many stops were pressed outside of the thread that draws.
+    pub fn outside(&self) -> u64 {
+        self.outside.load(Ordering::Acquire)
+    }
+
+    /// The thread that draws has taken note of so many of them: what it asks for from now on was asked for after them.
+    pub fn note(&self, number: u64) {
+        self.noted.fetch_max(number, Ordering::AcqRel);
+    }
+
+    /// Whether a stop is asked for and not done.
+    pub fn is_pressed(&self) -> bool {
+        self.wanted().is_some()
+    }
+
+    /// Whether nothing that moves may begin now.
+    pub fn is_barred(&self) -> bool {
+        self.is_pressed() || self.outside() > self.noted.load(Ordering::Acquire)
+    }
+
+    /// The number of the newest stop that is not done.
+    pub(crate) fn wanted(&self) -> Option<u64> {
+        let pressed = self.pressed.load(Ordering::Acquire);
+        (pressed > self.done.load(Ordering::Acquire)).then_some(pressed)
+    }
+
+    /// Stops up to this one are done. One that was pressed meanwhile is not.
+    pub(crate) fn finish(&self, number: u64) {
+        self.done.fetch_max(number, Ordering::AcqRel);
+    }
+
+    /// From now on a stop reaches these.
+    pub fn lead_to(&self, ends: Ends) {
+        *self.ends() = Some(ends);
+    }
+
+    /// It does not reach these any more, unless others have taken their place.
+    pub(crate) fn lead_away_from(&self, desk: &Arc<MotionQueue>) {
+        self.ends().take_if(|ends| Arc::ptr_eq(&ends.desk, desk));
+    }
+
+    fn ends(&self) -> MutexGuard<'_, Option<Ends>> {
+        self.ends.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_bars_the_arm_until_it_is_done_and_the_window_has_taken_note() {
+        let line = StopLine::default();
+        assert!(!line.is_barred());
+        let number = line.press_outside();
+        line.finish(line.wanted().expect("it is asked for"));
+        assert!(!line.is_pressed() && line.is_barred(), "the window may still do what was asked for before");
+        line.note(number);
+        assert!(!line.is_barred());
+        let (first, second) = (line.press_outside(), line.press_outside());
+        line.finish(2);
+        line.note(first);
+        assert!(line.is_pressed() && line.is_barred());
+        line.finish(3);
+        assert!(line.is_barred(), "one is left to take note of");
+        line.note(second);
+        assert!(!line.is_barred());
+    }
+
+    #[test]
+    fn a_stop_of_the_thread_that_draws_needs_no_note() {
+        let line = StopLine::default();
+        line.press();
+        assert!(line.is_barred());
+        line.finish(1);
+        assert!(!line.is_barred());
+    }
+}

@@ -1,0 +1,4 @@
+//! The calibration in other formats.
+
+pub(crate) mod state;
+pub(crate) mod update;

@@ -1,0 +1,146 @@
+//! Changes of the boxes: the arm keeps to them from its next motion on, and they are kept in a file.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use handeye_plan::Surroundings;
+use handeye_plan::surroundings::{KeepOutFile, SurroundingsError};
+
+use super::state::KeepOut;
+use crate::app::App;
+use crate::model::Severity;
+use crate::text::Text;
+use crate::worker::FileTask;
+use handeye_wording::text;
+
+/// How long after the last change they are written \[s\]: a value that is dragged changes with every frame.
+const WRITTEN_AFTER_S: f64 = 0.5;
+
+/// What a file says at the start; nothing where there is none. One that cannot be used is left as it is.
+pub(crate) fn opened(file: Option<PathBuf>) -> (KeepOut, Option<Text>) {
+    let Some(file) = file else { return (KeepOut::default(), None) };
+    match KeepOutFile::read(&file) {
+        Ok(content) => {
+            let mut keep_out = KeepOut { file: Some(file), ..KeepOut::default() };
+            keep_out.set(content);
+            let fault = keep_out.fault.clone();
+            (keep_out, fault)
+        }
+        Err(SurroundingsError::Unreadable { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+            (KeepOut { file: Some(file), ..KeepOut::default() }, None)
+        }
+        Err(error) => {
+            let said = text!(
+                "The arm does not keep out of the boxes of this file. The file stays as it is, and the present boxes are not kept for the next start: {error}",
+                error = error
+            );
+            (KeepOut { unsaved: Some(said.clone()), ..KeepOut::default() }, Some(said))
+        }
+    }
+}
+
+impl App {
+    pub(crate) fn set_keep_out(&mut self, content: KeepOutFile) {
+        self.model.keep_out.set(content);
+        self.model.keep_out.unwritten_since_s = Some(self.model.now_s);
+        self.send_keep_out();
+    }
+
+    /// Has the arm keep to them.
+    pub(crate) fn send_keep_out(&self) {
+        self.workers.keep_out(Arc::clone(&self.model.keep_out.around));
+    }
+
+    /// Whether the arm keeps out of them, and of what else. That it does not is said once.
+    pub(crate) fn standing_found(&mut self, standing: Result<Arc<Surroundings>, Text>) {
+        let keep_out = &mut self.model.keep_out;
+        match standing {
+            Ok(standing) => {
+                keep_out.standing = Some(standing);
+                keep_out.unkept = None;
+            }
+            Err(why) => {
+                let said = text!("The arm is not kept out of the boxes: {why}", why = why);
+                let is_news = keep_out.unkept.as_ref() != Some(&said) && !keep_out.content.boxes.is_empty();
+                keep_out.unkept = Some(said.clone());
+                if is_news {
+                    self.say(Severity::Warning, said);
+                }
+            }
+        }
+    }
+
+    pub(crate) fn import_keep_out(&mut self, file: PathBuf) {
+        let asked = self.desk.files(FileTask::ReadKeepOut(file));
+        self.expect(text!("The boxes were not read"), asked);
+    }
+
+    /// The boxes of a file come in place of those that there are.
+    pub(crate) fn keep_out_read(&mut self, content: KeepOutFile) {
+        let count = content.boxes.len();
+        self.set_keep_out(content);
+        self.say(Severity::Info, text!("The arm keeps out of {count} {count|box|boxes} of the file", count = count));
+    }
+
+    pub(crate) fn export_keep_out(&mut self, file: PathBuf) {
+        let text = self.model.keep_out.content.to_toml();
+        let asked = self.desk.files(FileTask::WriteKeepOut { file, text, is_wished: true });
+        self.expect(text!("The boxes were not written"), asked);
+    }
+
+    /// Keeps them in their file once nobody is changing them any longer, or at once.
+    pub(crate) fn keep_keep_out(&mut self, at_once: bool) {
+        let keep_out = &mut self.model.keep_out;
+        let Some(since_s) = keep_out.unwritten_since_s else { return };
+        if !at_once && self.model.now_s < since_s + WRITTEN_AFTER_S {
+            return;
+        }
+        keep_out.unwritten_since_s = None;
+        let Some(file) = keep_out.file.clone() else { return };
+        let text = keep_out.content.to_toml();
+        let asked = self.desk.files(FileTask::WriteKeepOut { file, text, is_wished: false });
+        self.expect(text!("The boxes were not written"), asked);
+    }
+}
+
+/// Writes them, as a whole or not at all.
+pub(crate) fn write(file: &Path, text: &str) -> io::Result<()> {
+    if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder)?;
+    }
+    let head = "# What the robot's arm keeps out of; docs/reference/surroundings.md lists the keys. Lengths are metres in the base.\n";
+    handeye_files::atomic_file::write(file, format!("{head}{text}").as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::keep_out::state::with_drawn;
+
+    #[test]
+    fn what_was_written_is_there_at_the_next_start_and_a_file_with_a_fault_is_left_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("deep").join("keep_out.toml");
+        let (none, said) = opened(Some(file.clone()));
+        assert_eq!((none.content.boxes.len(), none.file.as_deref(), said), (0, Some(file.as_path()), None));
+        let content = with_drawn(&none.content, [0.1, 0.1], [0.4, 0.3]).expect("a rectangle");
+        write(&file, &content.to_toml()).expect("written");
+        let (again, said) = opened(Some(file.clone()));
+        assert_eq!((&again.content, again.around.obstacles.len(), said), (&content, 1, None));
+
+        // One entry that makes no sense is shown, and takes no other one along.
+        let mut faulty = again.content.clone();
+        faulty.boxes.push(faulty.boxes[0].clone());
+        faulty.boxes[1].size_m[0] = -1.0;
+        write(&file, &faulty.to_toml()).expect("written");
+        let (with_fault, said) = opened(Some(file.clone()));
+        assert_eq!((with_fault.content, with_fault.around.obstacles.len()), (faulty, 1));
+        assert!(said.is_some() && with_fault.file.is_some());
+
+        std::fs::write(&file, "[[box]]\nname = \"post\"\n").expect("written");
+        let (broken, said) = opened(Some(file.clone()));
+        assert!(broken.file.is_none() && broken.unsaved.is_some(), "nothing is written over it");
+        assert!(said.is_some_and(|said| said.say(crate::text::Language::English).contains("keep_out.toml")));
+    }
+}

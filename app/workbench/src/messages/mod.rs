@@ -1,0 +1,4 @@
+//! What the program says: log, toasts, the banner.
+
+pub(crate) mod state;
+pub(crate) mod update;

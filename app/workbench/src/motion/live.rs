@@ -1,0 +1,410 @@
+//! The arm of a cell over the remote API, as the motion worker drives it.
+
+use handeye_arm::JointValues;
+use handeye_coppeliasim::cell::{
+    Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd,
+    JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
+};
+use handeye_coppeliasim::{CancelToken, LinkError, SimulationState};
+use handeye_plan::guided::choose::Robot;
+use handeye_plan::{Contact, PlanError, Surroundings};
+use nalgebra::Vector3;
+
+use crate::limits;
+use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
+use crate::text::Text;
+use crate::worker::cell_error::{check_arm, port_error};
+use crate::worker::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use handeye_wording::text;
+
+/// Seed of the views that are compared for a plan: the same question gets the same plan.
+pub(crate) const VIEWS_SEED: u64 = 1;
+
+/// A connection that moves the arm.
+pub(crate) struct LiveMotion {
+    arm: Arm,
+    kinematics: Result<ArmKinematics, UnknownKinematics>,
+    /// What the cell says stands around, as it was when the connection was made.
+    standing: Standing,
+    /// All of it with what a person keeps the arm out of, and with what holds the board: plans are for one that stands.
+    around: Surroundings,
+    /// The arm among all of it that does not go along with the board.
+    among: Option<Among>,
+}
+
+impl LiveMotion {
+    /// Over an arm whose kinematics is looked at once.
+    pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
+        let kinematics = arm.kinematics()?;
+        let standing = match &kinematics {
+            Ok(kinematics) => arm.surroundings(kinematics)?,
+            Err(why) => {
+                tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
+                Standing::default()
+            }
+        };
+        let mut live = Self { arm, kinematics, standing, around: Surroundings::default(), among: None };
+        live.keep_to(&Surroundings::default());
+        Ok(live)
+    }
+
+    /// From the next motion on: to what stands around and to what a person keeps it out of.
+    fn keep_to(&mut self, keep_out: &Surroundings) {
+        let Ok(kinematics) = &self.kinematics else { return };
+        self.around = self.standing.all().and(keep_out.clone());
+        self.among = Some(kinematics.among(self.standing.around.clone().and(keep_out.clone()), None));
+        self.arm.keep_clear(self.among.clone());
+    }
+
+    /// Whether there is a way, before anything moves. What the arm cannot do is `Some` reason.
+    fn obstacle(&mut self, goal: &MotionGoal) -> Result<Option<Text>, LinkError> {
+        let (MotionGoal::Tip(goal), Ok(kinematics)) = (goal, &self.kinematics) else { return Ok(None) };
+        let joints = self.arm.joint_values()?;
+        Ok(kinematics.reach(goal, &joints).err().map(|why| text!("The arm cannot go there: {why}", why = why)))
+    }
+
+    fn drive(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, LinkError> {
+        if let Some(why) = bad_speed(speed) {
+            return Ok(MotionOutcome::Refused(why));
+        }
+        let direct = match (goal, self.obstacle(goal)?) {
+            (_, Some(why)) => Err(why),
+            (MotionGoal::Joints(joints), None) => Self::unless_in_the_way(self.go_through(&[*joints], speed, cancel))?,
+            (MotionGoal::Tip(pose), None) => {
+                let limits = limits::of_tip(&limits::SEQUENCE, speed);
+                let moved = self.arm.move_to_pose(pose, &limits, &MotionTolerance::default(), cancel);
+                Self::unless_in_the_way(moved)?
+            }
+        };
+        // Nothing has moved where something is in the way.
+        let Err(why) = direct else { return Ok(MotionOutcome::Arrived) };
+        match self.way_around(goal, cancel)? {
+            Some(way) => self.go_through(&way, speed, cancel).map(|()| MotionOutcome::Arrived),
+            None => Ok(MotionOutcome::Refused(why)),
+        }
+    }
+
+    fn unless_in_the_way(moved: Result<(), LinkError>) -> Result<Result<(), Text>, LinkError> {
+        match moved {
+            Err(LinkError::InTheWay { contact }) => Ok(Err(contact_text(&contact))),
+            moved => moved.map(Ok),
+        }
+    }
+
+    /// From configuration to configuration, straight in joint space.
+    fn go_through(&mut self, way: &[JointValues], speed: f64, cancel: &CancelToken) -> Result<(), LinkError> {
+        let limits = limits::of_joints(&limits::SEQUENCE, speed, self.arm.info().joint_kinds());
+        for joints in way {
+            self.arm.move_to_joints(joints, &limits, cancel)?;
+        }
+        self.arm.settle(&SettleOptions::default(), cancel).map(|_settled| ())
+    }
+
+    /// A way to the goal where the direct one touches something; `None` where none is found.
+    fn way_around(&mut self, goal: &MotionGoal, cancel: &CancelToken) -> Result<Option<Vec<JointValues>>, LinkError> {
+        let start = self.arm.joint_values()?;
+        let Some(among) = &self.among else { return Ok(None) };
+        let guard = among.guard(&start);
+        Ok(match goal {
+            MotionGoal::Joints(joints) => guard.detour(&start, joints, VIEWS_SEED, cancel),
+            MotionGoal::Tip(pose) => guard.detour_to(&start, pose, VIEWS_SEED, cancel),
+        })
+    }
+
+    fn jog_by(
+        &mut self,
+        request: &JogRequest,
+        length: Option<f64>,
+        held: &mut dyn FnMut() -> Option<f64>,
+    ) -> Result<Result<JogEnd, Text>, LinkError> {
+        if let Some(why) = bad_speed(request.speed) {
+            return Ok(Err(why));
+        }
+        let jog = match arm_jog(request, self.kinematics.as_ref()) {
+            Ok(jog) => jog,
+            Err(why) => return Ok(Err(why)),
+        };
+        self.arm.jog(&jog, length, held).map(Ok)
+    }
+}
+
+impl MotionPort for LiveMotion {
+    fn check(&mut self) -> Result<(), PortError> {
+        check_arm(&mut self.arm)
+    }
+
+    fn move_to(&mut self, goal: &MotionGoal, speed: f64, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+        let outcome = self.drive(goal, speed, cancel);
+        outcome.or_else(|error| outcome_of(error, cancel))
+    }
+
+    fn jog_step(
+        &mut self,
+        request: &JogRequest,
+        length: f64,
+        cancel: &CancelToken,
+    ) -> Result<MotionOutcome, PortError> {
+        let speed = request.speed;
+        let mut held = || (!cancel.is_cancelled()).then_some(speed);
+        match self.jog_by(request, Some(length), &mut held) {
+            Ok(Ok(JogEnd::Arrived)) => Ok(MotionOutcome::Arrived),
+            Ok(Ok(JogEnd::Released | JogEnd::Stopped)) => Ok(MotionOutcome::Stopped),
+            Ok(Ok(JogEnd::NotFollowing { joint })) => Ok(MotionOutcome::Failed(not_following(joint))),
+            Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(MotionOutcome::Refused(obstacle_text(&obstacle))),
+            Ok(Ok(JogEnd::OtherTip)) => Ok(MotionOutcome::Refused(other_tip())),
+            Ok(Err(why)) => Ok(MotionOutcome::Refused(why)),
+            Err(error) => outcome_of(error, cancel),
+        }
+    }
+
+    fn jog(&mut self, request: &JogRequest, held: &mut dyn FnMut() -> Option<f64>) -> Result<Option<Text>, PortError> {
+        match self.jog_by(request, None, held) {
+            Ok(Ok(JogEnd::Arrived | JogEnd::Released)) => Ok(None),
+            Ok(Ok(JogEnd::Stopped)) => Ok(Some(text!("The arm was stopped"))),
+            Ok(Ok(JogEnd::NotFollowing { joint })) => Ok(Some(not_following(joint))),
+            Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(Some(obstacle_text(&obstacle))),
+            Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),
+            Ok(Err(why)) => Ok(Some(why)),
+            Err(error) if error.is_connection_loss() => Err(port_error(error)),
+            Err(error) => Ok(Some(said(&error))),
+        }
+    }
+
+    fn room(&mut self, board: &BoardInView) -> Result<Room, PortError> {
+        // Following says what is wrong with an arm of unknown kinematics.
+        let Ok(kinematics) = &self.kinematics else { return Ok(Room::Enough) };
+        let joints = self.arm.joint_values().map_err(port_error)?;
+        let limits = FollowLimits::default();
+        Ok(match kinematics.where_to_follow(&limits, board, &joints, &self.around, self.among.as_ref()) {
+            Ok(None) => Room::Enough,
+            Ok(Some(place)) => Room::At(place.joints),
+            Err(none) => Room::Nowhere(text!(
+                "Of {tried} places that show the whole board none has room for the arm to follow it: move the board \
+                 away from the column of the arm, and not to the end of its reach",
+                tried = none.tried
+            )),
+        })
+    }
+
+    fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
+        let ViewsRequest { board, taken, count } = request;
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => {
+                return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why)));
+            }
+        };
+        let start = self.arm.joint_values().map_err(port_error)?;
+        Ok(kinematics
+            .views_unlike(board, taken, &start, &self.around, *count, VIEWS_SEED)
+            .map_err(|why| no_views(&why)))
+    }
+
+    fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError> {
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why))),
+        };
+        let joints = self.arm.joint_values().map_err(port_error)?;
+        Ok(Ok(kinematics.guided_robot(&joints, limits::pace(&limits::SEQUENCE, speed), &self.around)))
+    }
+
+    fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
+        self.keep_to(keep_out);
+        match &self.kinematics {
+            Ok(_known) => Ok(self.standing.all()),
+            Err(why) => Err(text!("The kinematics of the arm is not known: {why}", why = why)),
+        }
+    }
+
+    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+        let kinematics = match &self.kinematics {
+            Ok(kinematics) => kinematics,
+            Err(why) => {
+                return Ok(MotionOutcome::Refused(text!(
+                    "The arm cannot follow, because its kinematics is not known: {why}",
+                    why = why
+                )));
+            }
+        };
+        match self.arm.follow(kinematics, &FollowLimits::default(), wish) {
+            Ok(end) => Ok(outcome_of_following(end)),
+            Err(error) => outcome_of(error, &CancelToken::default()),
+        }
+    }
+}
+
+/// Why no poses can be planned.
+pub(crate) fn no_views(why: &PlanError) -> Text {
+    match why {
+        PlanError::StartBlocked { by } => {
+            text!("At its present place the arm is {there}: move it into free space first", there = by.here())
+        }
+        PlanError::TooFewViews { candidates, not_in_view, unreachable, in_the_way, no_path, .. } => text!(
+            "Of {tried} views that were tried, {not_in_view} would not show the whole board, {unreachable} are out of \
+             reach, {in_the_way} would touch something, and {no_path} cannot be driven to safely: move the board towards \
+             the middle of the workspace",
+            tried = candidates,
+            not_in_view = not_in_view,
+            unreachable = unreachable,
+            in_the_way = in_the_way,
+            no_path = no_path
+        ),
+        other => other.into(),
+    }
+}
+
+fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
+    match end {
+        FollowEnd::Released | FollowEnd::Stopped => MotionOutcome::Stopped,
+        obstacle => MotionOutcome::Failed(end_of_following(&obstacle)),
+    }
+}
+
+/// Why the arm came to rest.
+pub fn end_of_following(end: &FollowEnd) -> Text {
+    match end {
+        FollowEnd::Released => text!("it was released"),
+        FollowEnd::Stopped => text!("The arm was stopped"),
+        FollowEnd::Workspace => text!("The goal is outside the box in which the tip may follow"),
+        FollowEnd::JointLimit { joint } => text!(
+            "Joint {joint} is at the end of its range. Start again and make room first: the arm then begins from where its \
+             joints have some on both sides",
+            joint = joint
+        ),
+        FollowEnd::Singular => {
+            text!(
+                "The arm is nearly stretched, close to its column, or two of its axes are in line: it cannot follow there. \
+                 Jog it to where it has more room and start again"
+            )
+        }
+        FollowEnd::NotFollowing { joint } => not_following(*joint),
+        FollowEnd::OtherTip => other_tip(),
+    }
+}
+
+/// Why a share of the fastest speed is none.
+fn bad_speed(speed: f64) -> Option<Text> {
+    let is_good = speed > 0.0 && speed <= 1.0;
+    let percent = speed * 100.0;
+    (!is_good).then(|| text!("{percent} % is not a speed: choose one over 0 % and up to 100 %", percent = percent))
+}
+
+/// What an error of the arm means for the motion; only a lost connection is an error here.
+fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, PortError> {
+    match error {
+        LinkError::MotionStopped { .. } => Ok(MotionOutcome::Stopped),
+        LinkError::Cancelled { .. } if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
+        error if error.is_connection_loss() => Err(port_error(error)),
+        // These are found out before anything moves.
+        error @ (LinkError::JointOutOfRange { .. }
+        | LinkError::JointCount { .. }
+        | LinkError::InTheWay { .. }
+        | LinkError::BadMotion { .. }
+        | LinkError::NoSuchObject { .. }
+        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(said(&error))),
+        error => Ok(MotionOutcome::Failed(said(&error))),
+    }
+}
+
+/// What a person does about it, in the language of the window; what is rare stays in the words of the client.
+fn said(error: &LinkError) -> Text {
+    match error {
+        LinkError::NotRunning { state: SimulationState::Paused, .. } => {
+            text!("The simulation is paused: continue it first")
+        }
+        LinkError::NotRunning { .. } => text!("The simulation is stopped: start it first"),
+        LinkError::JointElsewhere { joint, at, goal } => text!(
+            "Joint {joint} stands at {at} instead of {goal}: another client or a script of the scene moves or holds it",
+            joint = joint,
+            at = format!("{at:.3}"),
+            goal = format!("{goal:.3}")
+        ),
+        LinkError::JointOutOfRange { joint, goal, min, max } => text!(
+            "Joint {joint} cannot go to {goal}: its range is {min} to {max}",
+            joint = joint,
+            goal = format!("{goal:.2}"),
+            min = format!("{min:.1}"),
+            max = format!("{max:.1}")
+        ),
+        LinkError::JointCount { got, need } => text!(
+            "{got} joint values for an arm of {need} joints: the goal was taught for another arm",
+            got = got,
+            need = need
+        ),
+        LinkError::InTheWay { contact } => contact_text(contact),
+        LinkError::Unreached { distance_mm, angle_deg } => text!(
+            "The tip stopped {mm} mm and {deg}° from its goal, which may be out of reach: choose another pose, or go \
+             there joint by joint",
+            mm = format!("{distance_mm:.2}"),
+            deg = format!("{angle_deg:.2}")
+        ),
+        other => other.into(),
+    }
+}
+
+fn arm_jog<'a>(
+    request: &JogRequest,
+    kinematics: Result<&'a ArmKinematics, &UnknownKinematics>,
+) -> Result<ArmJog<'a>, Text> {
+    let (frame, axis, forward) = match request.jog {
+        Jog::Joint { index, forward } => return Ok(ArmJog::Joint { index, forward }),
+        Jog::Translate { frame, axis, forward } | Jog::Rotate { frame, axis, forward } => (frame, axis, forward),
+    };
+    let kinematics = kinematics.map_err(|why| {
+        text!("Only single joints can be jogged, because the kinematics of the arm is not known: {why}", why = why)
+    })?;
+    let axes = match frame {
+        JogFrame::Base => JogAxes::Base,
+        JogFrame::Tip => JogAxes::Tip,
+        JogFrame::Camera => JogAxes::Camera(request.tip_from_camera.ok_or_else(|| {
+            text!("Where the camera is on the tip is not known yet: calibrate first, or jog along other axes")
+        })?),
+    };
+    let forwards = match axis {
+        Axis::X => Vector3::x(),
+        Axis::Y => Vector3::y(),
+        Axis::Z => Vector3::z(),
+    };
+    let direction = if forward { forwards } else { -forwards };
+    Ok(match request.jog {
+        Jog::Rotate { .. } => ArmJog::Turn { kinematics, axes, about: direction },
+        Jog::Translate { .. } | Jog::Joint { .. } => ArmJog::Line { kinematics, axes, along: direction },
+    })
+}
+
+fn obstacle_text(obstacle: &JogObstacle) -> Text {
+    match obstacle {
+        JogObstacle::JointRange { joint, limit } => {
+            text!("Joint {joint} is at the end of its range, {limit}", joint = joint, limit = format!("{limit:.1}"))
+        }
+        JogObstacle::Reach(why) => text!("The arm reaches no further: {why}", why = why),
+        JogObstacle::Singular { joint } => text!(
+            "The arm is stretched, or two of its axes are in line: joint {joint} would be too fast. Go another way or \
+             move single joints",
+            joint = joint
+        ),
+        JogObstacle::Contact(contact) => contact_text(contact),
+        other => other.into(),
+    }
+}
+
+/// What the arm would come too near to.
+pub(crate) fn contact_text(contact: &Contact) -> Text {
+    match contact {
+        Contact::Box { name } => {
+            text!("The arm, or what it carries, would come too near to “{name}”: go another way", name = name)
+        }
+        Contact::Itself => text!("The arm would touch itself, or what it carries: go another way"),
+        Contact::Volume => text!("Tip or camera would leave the work volume: go another way"),
+        other => other.into(),
+    }
+}
+
+fn not_following(joint: usize) -> Text {
+    text!("Joint {joint} is not where it was sent: something else moves or holds the arm", joint = joint)
+}
+
+fn other_tip() -> Text {
+    text!("The tip is not where the arm's kinematics has it: it was moved. Connect again, or move single joints")
+}

@@ -1,0 +1,12 @@
+//! Moving the arm: goals, jogging, and what refuses or ends a motion.
+
+pub(crate) mod ask;
+pub mod desk;
+pub mod grip;
+pub(crate) mod jog_line;
+pub(crate) mod live;
+pub(crate) mod rest;
+pub(crate) mod state;
+pub(crate) mod update;
+pub mod way;
+pub(crate) mod worker;

@@ -1,0 +1,219 @@
+//! The motion worker: moves the arm, one thing at a time, and says how it ended.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Duration;
+
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::{FollowMoment, FollowWish as ArmWish};
+use handeye_plan::guided::choose::Robot;
+
+use super::desk::{MotionQueue, MotionTask, Work};
+use super::jog_line::Held;
+use crate::command::Event;
+use crate::guided::state::{Choice, GuideRequest};
+use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionOutcome, Severity};
+use crate::text::Text;
+use crate::track::follow_line::FollowLine;
+use crate::worker::link::{Duty, Outlet};
+use crate::worker::port::{Connected, Connector, JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use handeye_wording::text;
+
+/// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
+const PERIOD: Duration = Duration::from_millis(100);
+
+/// Look at the [`MotionQueue`] now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MotionLook;
+
+/// The duty of the motion worker.
+pub struct Motions {
+    desk: Arc<MotionQueue>,
+    line: Arc<FollowLine>,
+}
+
+impl Motions {
+    /// With the places where it is told what to do, and where the board is.
+    pub fn new(desk: Arc<MotionQueue>, line: Arc<FollowLine>) -> Self {
+        Self { desk, line }
+    }
+
+    fn run(
+        &self,
+        port: &mut dyn MotionPort,
+        task: &MotionTask,
+        cancel: &CancelToken,
+        outlet: &Outlet,
+    ) -> Result<(), PortError> {
+        let outcome = match task {
+            MotionTask::Move(request) => port.move_to(&request.goal, request.speed, cancel),
+            MotionTask::JogStep { request, length, .. } => port.jog_step(request, *length, cancel),
+            MotionTask::Follow { wish, speed, .. } => self.follow(port, *wish, *speed, cancel, outlet),
+            MotionTask::Guide { id, request } => return self.guide(port, *id, request, cancel, outlet),
+            MotionTask::Plan { id, request } => return self.plan(port, *id, request, outlet),
+        };
+        // First, so that what the window asks for next is not refused.
+        self.desk.done();
+        let (reported, ended) = match outcome {
+            Ok(outcome) => (outcome, Ok(())),
+            // Nobody sends the arm any further. What may still move is the business of the stop.
+            Err(error) if cancel.is_cancelled() => (MotionOutcome::Stopped, Err(error)),
+            Err(error) => {
+                (MotionOutcome::Failed(text!("The connection broke: {error}", error = error.why().clone())), Err(error))
+            }
+        };
+        outlet.report(Event::Moved { id: task.id(), outcome: reported });
+        ended
+    }
+
+    fn plan(
+        &self,
+        port: &mut dyn MotionPort,
+        id: MotionId,
+        request: &ViewsRequest,
+        outlet: &Outlet,
+    ) -> Result<(), PortError> {
+        let planned = port.views(request);
+        self.desk.done();
+        let (views, ended) = match planned {
+            Ok(views) => (views, Ok(())),
+            Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
+        };
+        outlet.report(Event::Planned { id, views });
+        ended
+    }
+
+    fn guide(
+        &self,
+        port: &mut dyn MotionPort,
+        id: MotionId,
+        request: &GuideRequest,
+        cancel: &CancelToken,
+        outlet: &Outlet,
+    ) -> Result<(), PortError> {
+        let (outcome, ended) = match port.robot(request.speed) {
+            Ok(robot) => (robot.and_then(|robot| chosen(request, &robot, cancel)), Ok(())),
+            Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
+        };
+        self.desk.done();
+        outlet.report(Event::Guided { id, outcome });
+        ended
+    }
+
+    fn follow(
+        &self,
+        port: &mut dyn MotionPort,
+        wish: FollowWish,
+        speed: f64,
+        cancel: &CancelToken,
+        outlet: &Outlet,
+    ) -> Result<MotionOutcome, PortError> {
+        let board = self.line.board_in_view().filter(|_| wish == FollowWish::KeepViewWithRoom);
+        match board.map(|board| port.room(&board)).transpose()? {
+            None | Some(Room::Enough) => self.line.begin(wish),
+            Some(Room::Nowhere(why)) => return Ok(MotionOutcome::Refused(why)),
+            Some(Room::At(joints)) => {
+                outlet.report(Event::Follow(FollowStatus::MakingRoom));
+                outlet.notice(
+                    Severity::Info,
+                    text!(
+                        "Here the arm has no room to follow the board: it moves to the nearest place where it has, and keeps the view from there"
+                    ),
+                );
+                match port.move_to(&MotionGoal::Joints(joints), speed, cancel)? {
+                    MotionOutcome::Arrived => self.line.begin_elsewhere(wish),
+                    outcome => return Ok(outcome),
+                }
+            }
+        }
+        let mut wanted = |moment: &FollowMoment| {
+            if cancel.is_cancelled() { ArmWish::End } else { self.line.wish(moment) }
+        };
+        let outcome = port.follow(&mut wanted)?;
+        Ok(match (outcome, self.line.take_ended()) {
+            (MotionOutcome::Stopped, Some(why)) if !cancel.is_cancelled() => MotionOutcome::Failed(why),
+            (outcome, _) => outcome,
+        })
+    }
+
+    fn jog(&self, port: &mut dyn MotionPort, request: &JogRequest, outlet: &Outlet) -> Result<(), PortError> {
+        let mut forgotten = None;
+        let mut held = || match self.desk.is_held(request, outlet.now_s()) {
+            Held::Yes(speed) => Some(speed),
+            Held::Released => None,
+            Held::Forgotten { after_s } => {
+                forgotten = Some(after_s);
+                None
+            }
+        };
+        let outcome = port.jog(request, &mut held);
+        let (why, ended) = match outcome {
+            Ok(why) => (why, Ok(())),
+            Err(error) => (Some(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
+        };
+        if let Some(event) = self.desk.end_jog(request, why, forgotten, outlet.now_s()) {
+            outlet.report(event);
+        }
+        ended
+    }
+
+    /// Before anything moves, and after what moves was taken: what was wished before it holds for it.
+    fn keep_out(&self, port: &mut dyn MotionPort, outlet: &Outlet) {
+        let Some(keep_out) = self.desk.take_keep_out() else { return };
+        outlet.report(Event::Standing(port.keep_out(&keep_out).map(Arc::new)));
+    }
+
+    fn work(&self, port: &mut dyn MotionPort, outlet: &Outlet) -> Result<Duration, PortError> {
+        let work = self.desk.take(outlet.now_s());
+        self.keep_out(port, outlet);
+        match work {
+            Work::Motion(task, cancel) => self.run(port, &task, &cancel, outlet)?,
+            Work::Jog(request) => self.jog(port, &request, outlet)?,
+            Work::Nothing => {
+                port.check()?;
+                return Ok(PERIOD);
+            }
+        }
+        Ok(Duration::ZERO)
+    }
+}
+
+impl Duty for Motions {
+    type Port = Box<dyn MotionPort>;
+    type Task = MotionLook;
+    const LINK: Link = Link::Motion;
+
+    fn connect(
+        &mut self,
+        connector: &dyn Connector,
+        shutdown: &CancelToken,
+    ) -> Result<Connected<Self::Port>, PortError> {
+        let connected = connector.connect_motion(shutdown)?;
+        self.desk.connected();
+        Ok(connected)
+    }
+
+    fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
+        let worked = self.work(port.as_mut(), outlet);
+        if worked.is_err() {
+            self.desk.disconnected(outlet.now_s());
+        }
+        worked
+    }
+
+    /// The turn that follows looks.
+    fn perform(
+        &mut self,
+        _port: Option<&mut Self::Port>,
+        _look: MotionLook,
+        _outlet: &Outlet,
+    ) -> Result<(), PortError> {
+        Ok(())
+    }
+}
+
+/// A defect in the choice must not take the thread that moves the arm.
+fn chosen(request: &GuideRequest, robot: &Robot, cancel: &CancelToken) -> Result<Box<Choice>, Text> {
+    let chosen = catch_unwind(AssertUnwindSafe(|| request.choose(robot, cancel)));
+    chosen.map(Box::new).map_err(|_panic| text!("The choice of a pose failed by a defect of this program: report it"))
+}

@@ -1,0 +1,8 @@
+//! The session: the thread that keeps it, its folder, undo and redo.
+
+pub(crate) mod archive;
+pub(crate) mod desk;
+pub mod facts;
+pub mod start;
+pub(crate) mod state;
+pub(crate) mod update;

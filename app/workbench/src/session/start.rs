@@ -1,0 +1,51 @@
+//! What a new session begins with.
+
+use std::collections::BTreeMap;
+
+use handeye_arm::{ArmKind, ArmModel, JointKind};
+use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_session::{GroundTruth, SessionMeta};
+
+use crate::model::Truth;
+
+/// The board of the reference scene.
+pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
+
+/// The arm whose kinematics is built in, of which a cell tells whether it is its own.
+const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
+
+/// The ten reference poses, so that they are there wherever the binary is.
+pub const REFERENCE_POSES: &str = include_str!("../../../../assets/poses/seed10.toml");
+
+/// The arm whose joint values the estimate of joint offsets may use: of any other the values are kept and not used.
+pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {
+    kinematics.filter(|arm| arm.is_ur5()).map(|_ur5| BUILT_IN_ARM)
+}
+
+/// How the joints of an arm move, where a session has to say so: where they are others than six that turn.
+pub fn joint_kinds(kinds: impl Iterator<Item = JointKind>) -> Option<Vec<JointKind>> {
+    let kinds: Vec<JointKind> = kinds.collect();
+    (kinds != [JointKind::Revolute; 6] && !kinds.is_empty()).then_some(kinds)
+}
+
+/// A camera on the tip and the board of the reference scene, with the truth of a cell that publishes it.
+pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
+    let ground_truth = truth.and_then(|truth| {
+        let links =
+            HandEye::EyeInHand { tip_from_camera: truth.tip_from_camera, base_from_target: truth.base_from_target? };
+        Some(GroundTruth::new(&links, Some(truth.intrinsics)))
+    });
+    SessionMeta {
+        created,
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        mode: Mode::EyeInHand,
+        target: BOARD,
+        camera: None,
+        seeds: BTreeMap::new(),
+        ground_truth,
+        arm: None,
+        joint_kinds: None,
+    }
+}

@@ -1,0 +1,3 @@
+//! The target, the camera and where it is mounted.
+
+pub(crate) mod print;

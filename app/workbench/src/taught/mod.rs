@@ -1,0 +1,5 @@
+//! Taught poses, and the sequence that visits them.
+
+mod cell;
+pub(crate) mod sequence;
+pub mod update;

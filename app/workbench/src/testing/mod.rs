@@ -1,0 +1,3 @@
+//! Models in known states, for tests. Feature `testing`.
+
+pub mod sample;

@@ -1,0 +1,68 @@
+use handeye_geometry::frames::{Base, Pose, Tip};
+
+use super::*;
+use crate::testing::sample;
+
+/// What tracks the board of the sample, and its newest sight of it at 30 s.
+fn line() -> (FollowLine, Update, Pose<Base, Tip>) {
+    let model = sample::tracking();
+    let setup = Setup {
+        target: model.document().meta.target,
+        calibrated: model.calibrated().expect("calibrated").clone(),
+        motion: handeye_track::MotionModel::default(),
+    };
+    let line = FollowLine::default();
+    line.set_up(Some(setup));
+    let newest = model.track.newest.as_ref().expect("tracked").update.clone();
+    (line, newest, model.robot.as_ref().expect("a robot").base_from_tip)
+}
+
+fn moment(sim_time_s: f64, base_from_tip: Pose<Base, Tip>) -> FollowMoment {
+    FollowMoment { sim_time_s, joints: [0.0; 6].into(), base_from_tip, is_kept_off: false }
+}
+
+#[test]
+fn an_arm_that_was_moved_waits_for_the_board_and_then_keeps_the_view_that_it_has_there() {
+    let (line, seen, tip) = line();
+    let lost = Update { state: State::Lost { since_s: 29.0 }, estimate: None, seen: None, ..seen.clone() };
+    line.see(&lost);
+    line.begin_elsewhere(FollowWish::KeepViewWithRoom);
+    assert_eq!(line.wish(&moment(30.0, tip)), ArmWish::Rest);
+    line.see(&seen);
+    let ArmWish::Towards(goal) = line.wish(&moment(30.05, tip)) else { panic!("it follows") };
+    // The board is at 6 mm/s: after two passes the goal is still where the tip is.
+    assert!(goal.base_from_tip.distance_to(&tip).0 < 1e-3);
+}
+
+#[test]
+fn an_arm_that_loses_the_board_stands_and_goes_on_when_it_is_seen_again_in_time() {
+    let (line, seen, tip) = line();
+    let lost = Update { state: State::Lost { since_s: 29.0 }, estimate: None, seen: None, ..seen.clone() };
+    line.see(&seen);
+    line.begin(FollowWish::KeepView);
+    let is_followed = |at_s: f64| matches!(line.wish(&moment(at_s, tip)), ArmWish::Towards(_));
+    assert!(is_followed(30.05));
+    line.see(&lost);
+    assert_eq!(line.wish(&moment(30.1, tip)), ArmWish::Rest);
+    assert_eq!(line.take_status(), Some(FollowStatus::Waiting));
+    line.see(&seen);
+    assert!(is_followed(30.2));
+    // The images stop: the newest one grows old.
+    assert_eq!(line.wish(&moment(30.2 + LONGEST_GUESS_S, tip)), ArmWish::Rest);
+    assert_eq!(line.wish(&moment(30.1 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::Rest);
+    assert_eq!(line.wish(&moment(30.3 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::End);
+    assert!(line.take_ended().is_some());
+}
+
+#[test]
+fn an_arm_that_waits_in_vain_ends_and_one_that_was_not_moved_does_not_wait() {
+    let (line, seen, tip) = line();
+    let lost = Update { state: State::Searching, estimate: None, seen: None, ..seen };
+    line.see(&lost);
+    line.begin_elsewhere(FollowWish::KeepView);
+    assert_eq!(line.wish(&moment(30.0, tip)), ArmWish::Rest);
+    assert_eq!(line.wish(&moment(30.0 + PATIENCE_S - 0.01, tip)), ArmWish::Rest);
+    assert_eq!(line.wish(&moment(30.0 + PATIENCE_S, tip)), ArmWish::End);
+    line.begin(FollowWish::KeepView);
+    assert_eq!(line.wish(&moment(40.0, tip)), ArmWish::End);
+}

@@ -1,0 +1,7 @@
+//! The board from image to image, and the arm that follows it.
+
+pub(crate) mod follow_line;
+pub(crate) mod state;
+pub(crate) mod trail;
+pub(crate) mod update;
+pub(crate) mod worker;

@@ -1,0 +1,1 @@
+//! The calibration against captures that never entered its fit.

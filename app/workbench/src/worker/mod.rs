@@ -1,0 +1,434 @@
+//! The threads behind the window. All but `vision` own one connection to the cell and make it again when it breaks.
+//!
+//! | thread | does | reports through |
+//! | --- | --- | --- |
+//! | `control` | robot state, simulation, stop | events; newest [`RobotState`] |
+//! | `camera` | images, colours of the depth | events; newest [`LiveFrame`] |
+//! | `motion` | motions and jogs, one at a time | events; refusals through the [`MotionQueue`] |
+//! | `vision` | board in the newest image, captures | events; newest [`LiveDetection`]; [`Measured`] |
+//!
+//! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
+//! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
+
+pub(crate) mod cell_error;
+pub(crate) mod files;
+pub(crate) mod link;
+pub(crate) mod live;
+pub(crate) mod newest;
+pub(crate) mod port;
+pub(crate) mod rate;
+pub(crate) mod reconnect;
+mod shared;
+pub(crate) mod slot;
+pub(crate) mod started;
+mod vision;
+
+#[cfg(feature = "testing")]
+pub mod fake;
+
+pub use shared::{Busy, Clock, JOIN_DEADLINE, Waker};
+pub(crate) use shared::{MAX_EVENTS, MAX_REQUESTS, POLL};
+use std::io;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
+use handeye_coppeliasim::CancelToken;
+use handeye_geometry::frames::{Camera as CameraFrame, Pose, Tip};
+use handeye_plan::Surroundings;
+
+pub use crate::connect::stop_line::StopLine;
+pub use crate::connect::worker::ControlTask;
+pub use crate::live::worker::CameraTask;
+pub use crate::motion::desk::{MotionQueue, MotionTask};
+pub use crate::motion::jog_line::HELD_S;
+pub use crate::motion::live::end_of_following;
+pub use crate::motion::worker::MotionLook;
+pub use crate::session::archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
+pub use crate::session::desk::SessionThreads;
+pub use crate::solve::observer::ObserveJob;
+pub use crate::solve::worker::{SolveJob, answer, examined};
+pub use crate::track::follow_line::FollowLine;
+pub use crate::track::worker::{TrackedImage, Tracking};
+pub use files::{ExportJob, FileTask};
+pub use link::Request;
+pub use live::LiveConnector;
+pub use port::{
+    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room,
+    ViewsRequest,
+};
+pub use slot::LatestSlot;
+pub use started::Started;
+pub use vision::VisionTask;
+
+use crate::capture::Measured;
+use crate::command::Event;
+use crate::connect::stop_line::Ends;
+use crate::connect::worker::Control;
+use crate::guided::state::GuideRequest;
+use crate::live::worker::Camera;
+use crate::model::{
+    CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
+};
+use crate::motion::worker::Motions;
+use link::{Duty, LinkLoop, Outlet};
+use reconnect::Reconnect;
+use slot::Tap;
+use vision::{Vision, VisionSlots};
+
+/// The application's end of the workers.
+pub struct Workers {
+    control: Option<Sender<Request<ControlTask>>>,
+    camera: Option<Sender<Request<CameraTask>>>,
+    motion: Option<Sender<Request<MotionLook>>>,
+    vision: Option<Sender<VisionTask>>,
+    /// Those of the control worker come last: that the arm was stopped is told after what the stop ended.
+    events: Option<[Receiver<Event>; 2]>,
+    stop: Arc<StopLine>,
+    desk: Arc<MotionQueue>,
+    clock: Clock,
+    robot: Arc<LatestSlot<Option<RobotState>>>,
+    frames: Arc<LatestSlot<LiveFrame>>,
+    detections: Arc<LatestSlot<LiveDetection>>,
+    tracked: Arc<LatestSlot<Tracked>>,
+    follow: Arc<FollowLine>,
+    /// Until they end: a cell that it started ends with it.
+    connector: Option<Arc<dyn Connector>>,
+    shutdown: CancelToken,
+    threads: Vec<Started>,
+}
+
+impl Workers {
+    /// Starts the threads. What is captured goes to `captures`.
+    ///
+    /// # Errors
+    /// When the system has no more threads.
+    pub fn start(
+        source: &CellSource,
+        view: &ViewSettings,
+        connector: &Arc<dyn Connector>,
+        captures: Sender<Measured>,
+        stop: &Arc<StopLine>,
+        clock: &Clock,
+        waker: &Waker,
+    ) -> io::Result<Self> {
+        let (event_sender, events) = bounded(MAX_EVENTS);
+        // Who stops the arm never waits for the window to look.
+        let (control_sender, control_events) = unbounded();
+        let mut workers = Self::idle([events, control_events], stop, connector, clock, waker);
+        let outlet_to = |events: &Sender<Event>| {
+            let events = events.clone();
+            Outlet { events, waker: Arc::clone(waker), clock: Arc::clone(clock) }
+        };
+        let outlet = || outlet_to(&event_sender);
+        let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
+        workers.control = Some(workers.spawn("control", duty, source, connector, outlet_to(&control_sender))?);
+        let (tap, bell) = Tap::new();
+        let tap = Arc::new(tap);
+        let duty = Camera::new(view, Arc::clone(&workers.frames), Arc::clone(&tap));
+        workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
+        let duty = Motions::new(Arc::clone(&workers.desk), Arc::clone(&workers.follow));
+        workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
+        let (sender, tasks) = bounded(MAX_REQUESTS);
+        let sights = VisionSlots {
+            detections: Arc::clone(&workers.detections),
+            tracked: Arc::clone(&workers.tracked),
+            follow: Arc::clone(&workers.follow),
+        };
+        let vision = Vision::new(tap, bell, tasks, sights, captures, outlet(), workers.shutdown.clone());
+        workers.run("vision", move || vision.run())?;
+        workers.vision = Some(sender);
+        workers.lead_stop();
+        Ok(workers)
+    }
+
+    /// No threads yet.
+    fn idle(
+        events: [Receiver<Event>; 2],
+        stop: &Arc<StopLine>,
+        connector: &Arc<dyn Connector>,
+        clock: &Clock,
+        waker: &Waker,
+    ) -> Self {
+        Self {
+            control: None,
+            camera: None,
+            motion: None,
+            vision: None,
+            events: Some(events),
+            stop: Arc::clone(stop),
+            desk: Arc::new(MotionQueue::new(Arc::clone(stop.grip()), Arc::clone(waker))),
+            clock: Arc::clone(clock),
+            robot: Arc::default(),
+            frames: Arc::default(),
+            detections: Arc::default(),
+            tracked: Arc::default(),
+            follow: Arc::default(),
+            connector: Some(Arc::clone(connector)),
+            shutdown: CancelToken::default(),
+            threads: Vec::new(),
+        }
+    }
+
+    /// From now on a stop reaches these threads.
+    fn lead_stop(&self) {
+        let Some(control) = self.control.clone() else { return };
+        self.stop.lead_to(Ends { desk: Arc::clone(&self.desk), control, clock: Arc::clone(&self.clock) });
+    }
+
+    fn spawn<D: Duty + 'static>(
+        &mut self,
+        name: &str,
+        duty: D,
+        source: &CellSource,
+        connector: &Arc<dyn Connector>,
+        outlet: Outlet,
+    ) -> io::Result<Sender<Request<D::Task>>> {
+        let (sender, requests) = bounded(MAX_REQUESTS);
+        let reconnect = Reconnect::new(source.clone());
+        let connector = Arc::clone(connector);
+        let shutdown = self.shutdown.clone();
+        self.run(name, move || {
+            LinkLoop { duty, connector: connector.as_ref(), requests, outlet, shutdown }.run(reconnect);
+        })?;
+        Ok(sender)
+    }
+
+    fn run(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        self.threads.push(Started::spawn(name, work)?);
+        Ok(())
+    }
+
+    /// Hands over everything that was reported since the last time. Never waits for a worker.
+    pub fn drain(&self, mut absorb: impl FnMut(Event)) {
+        for events in self.events.iter().flatten() {
+            events.try_iter().take(MAX_EVENTS).for_each(&mut absorb);
+        }
+        self.desk.take_said().into_iter().for_each(&mut absorb);
+        if let Some((robot, _)) = self.robot.take() {
+            absorb(robot.map_or(Event::NoRobot, Event::Robot));
+        }
+        if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
+            absorb(Event::Frame { info, dropped, images: Some(images) });
+        }
+        if let Some((detection, _)) = self.detections.take() {
+            absorb(Event::Detection(Box::new(detection)));
+        }
+        if let Some((tracked, _)) = self.tracked.take() {
+            absorb(Event::Tracked(Arc::new(tracked)));
+        }
+        if let Some(status) = self.follow.take_status() {
+            absorb(Event::Follow(status));
+        }
+    }
+
+    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
+    /// worker's connection, whoever moves the arm. A motion or a jog of this program ends as well, and nothing is left
+    /// that could begin afterwards.
+    pub fn press_stop(&self) {
+        self.stop.press();
+    }
+
+    /// What stops the arm, for other threads.
+    pub fn stop_line(&self) -> &Arc<StopLine> {
+        &self.stop
+    }
+
+    /// Has the arm keep out of these from its next motion on, also over the next connection.
+    pub fn keep_out(&self, keep_out: Arc<Surroundings>) {
+        self.desk.keep_out(keep_out);
+    }
+
+    /// Asks for a motion. However it ends, [`Event::Moved`] tells once, also when it is refused because something moves
+    /// already.
+    ///
+    /// # Errors
+    /// [`Busy`] when the program ends; then nothing is reported.
+    pub fn move_to(&self, request: MotionRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Move(request))
+    }
+
+    /// Asks for one step of a jog at a share of the fastest speed: metres along a line or of a prismatic joint, radians about an
+    /// axis or of a revolute joint. Reported as [`Self::move_to`].
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn jog_step(
+        &self,
+        id: MotionId,
+        jog: Jog,
+        length: f64,
+        speed: f64,
+        tip_from_camera: Option<Pose<Tip, CameraFrame>>,
+    ) -> Result<(), Busy> {
+        self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
+    }
+
+    /// Has the arm follow the board that is tracked, from a place where it has room if that is wished, to which it moves at
+    /// a share of the fastest speed; until [`Self::cancel_motion`], a stop, or the board is lost. Reported
+    /// as [`Self::move_to`]; why it ended by itself is the reason of a motion that failed.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn follow(&self, id: MotionId, wish: FollowWish, speed: f64) -> Result<(), Busy> {
+        self.begin(MotionTask::Follow { id, wish, speed })
+    }
+
+    /// Asks for poses to look at the board from. [`Event::Planned`] tells them; [`Event::Moved`], with the same number, why
+    /// they are not looked for.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn plan_views(&self, id: MotionId, request: ViewsRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Plan { id, request: Box::new(request) })
+    }
+
+    /// Asks for the next pose of a guided sequence. [`Event::Guided`] tells it; [`Event::Moved`], with the same number, why
+    /// it is not chosen.
+    ///
+    /// # Errors
+    /// As [`Self::move_to`].
+    pub fn guide(&self, id: MotionId, request: GuideRequest) -> Result<(), Busy> {
+        self.begin(MotionTask::Guide { id, request: Box::new(request) })
+    }
+
+    /// Ends the motion that is under way, without a stop of everything else.
+    pub fn cancel_motion(&self) {
+        self.desk.cancel(self.now_s());
+    }
+
+    /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
+    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells that the arm stands: when the jog ends, and once more when
+    /// a button is let go that had been held for longer.
+    pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
+        let request = JogRequest { jog, tip_from_camera, speed };
+        if self.desk.hold(request, &self.stop, self.now_s()) {
+            self.wake_motion();
+        }
+    }
+
+    /// No jog button is held now.
+    pub fn release_jog(&self) {
+        self.desk.release();
+    }
+
+    fn begin(&self, task: MotionTask) -> Result<(), Busy> {
+        if self.motion.is_none() {
+            return Err(Busy);
+        }
+        self.desk.ask(task, &self.stop);
+        self.wake_motion();
+        Ok(())
+    }
+
+    /// A worker that is too busy to be woken looks at the desk by itself.
+    fn wake_motion(&self) {
+        let woken = ask(self.motion.as_ref(), Request::Do(MotionLook));
+        tracing::trace!(?woken, "the motion worker was told to look");
+    }
+
+    fn now_s(&self) -> f64 {
+        (self.clock)()
+    }
+
+    /// Has every worker without a connection try now.
+    ///
+    /// # Errors
+    /// [`Busy`] when one does not take requests.
+    pub fn reconnect(&self) -> Result<(), Busy> {
+        self.connector.iter().for_each(|connector| connector.again());
+        self.look_at_connection()
+    }
+
+    /// Has no worker try to connect any more until [`Self::reconnect`], where a try starts a program.
+    ///
+    /// # Errors
+    /// As [`Self::reconnect`].
+    pub fn stop_trying(&self) -> Result<(), Busy> {
+        self.connector.iter().for_each(|connector| connector.rest());
+        self.look_at_connection()
+    }
+
+    fn look_at_connection(&self) -> Result<(), Busy> {
+        let motion = ask(self.motion.as_ref(), Request::Reconnect);
+        self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)).and(motion)
+    }
+
+    /// Asks the control worker for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_control(&self, request: Request<ControlTask>) -> Result<(), Busy> {
+        ask(self.control.as_ref(), request)
+    }
+
+    /// Asks the camera worker for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_camera(&self, request: Request<CameraTask>) -> Result<(), Busy> {
+        ask(self.camera.as_ref(), request)
+    }
+
+    /// Asks the vision thread for something.
+    ///
+    /// # Errors
+    /// [`Busy`] when it does not take requests.
+    pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
+        ask(self.vision.as_ref(), task)
+    }
+
+    /// Whether this program moves the arm, or is about to.
+    pub fn is_moving(&self) -> bool {
+        self.desk.is_busy(self.now_s())
+    }
+
+    /// Waits until this program does not move the arm and a stop that was asked for is done, but no longer than until
+    /// `end`; whether it is so. What is reported meanwhile is lost: for the end of the program.
+    pub fn come_to_rest(&self, end: Instant) -> bool {
+        loop {
+            // A worker whose reports nobody takes would wait, and the arm go on.
+            self.drain(|_lost| {});
+            if !self.is_moving() && !self.stop.is_pressed() {
+                return true;
+            }
+            let Some([events, _]) = self.events.as_ref().filter(|_| Instant::now() < end) else { return false };
+            let _lost = events.recv_timeout(POLL).is_ok();
+        }
+    }
+
+    /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
+    /// within the deadline is left alone, so that the program can end; returns how many there are.
+    pub fn shut_down(&mut self, deadline: Duration) -> usize {
+        self.shutdown.cancel();
+        self.stop.lead_away_from(&self.desk);
+        self.control = None;
+        self.camera = None;
+        self.motion = None;
+        self.vision = None;
+        self.events = None;
+        self.connector = None;
+        let end = Instant::now() + deadline;
+        self.threads.drain(..).map(|thread| thread.join_until(end)).filter(|has_ended| !has_ended).count()
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        self.shut_down(JOIN_DEADLINE);
+    }
+}
+
+fn ask<T>(worker: Option<&Sender<T>>, request: T) -> Result<(), Busy> {
+    match worker.map(|worker| worker.try_send(request)) {
+        Some(Ok(())) => Ok(()),
+        Some(Err(TrySendError::Full(_) | TrySendError::Disconnected(_))) | None => Err(Busy),
+    }
+}
+
+#[cfg(test)]
+mod live_tests;
+#[cfg(test)]
+mod motion_tests;
+#[cfg(test)]
+mod tests;
