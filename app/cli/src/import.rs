@@ -17,7 +17,7 @@ use handeye_wording::{English, Text};
 use serde_json::json;
 
 use super::output::Output;
-use crate::{Failure, out, solve, target};
+use crate::{Failure, out, solve};
 use handeye_workbench::arguments::heading;
 use handeye_workbench::import::understand::{self, NotUnderstood};
 

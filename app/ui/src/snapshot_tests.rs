@@ -1,7 +1,7 @@
 //! Images of the whole window in its main states, compared with those in `tests/snapshots`.
 //!
 //! They are drawn on the processor, by Mesa's llvmpipe through Vulkan, so that every machine draws the same. How much may
-//! differ stands in `kittest.toml`. After a change that is meant: `UPDATE_SNAPSHOTS=1 ./test -p handeye_app --lib
+//! differ stands in `kittest.toml`. After a change that is meant: `UPDATE_SNAPSHOTS=1 ./test -p handeye_ui --lib
 //! snapshot`, and look at each image before it is committed.
 
 use std::sync::Arc;

@@ -10,7 +10,6 @@ use crate::style::theme::{Palette, Tone};
 use crate::style::{form, parts};
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
-use handeye_workbench::connect::drivers;
 use handeye_workbench::connect::server_name;
 use handeye_workbench::model::{CellSource, Link, LinkState, Model};
 use handeye_workbench::text::Text;

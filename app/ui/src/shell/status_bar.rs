@@ -10,7 +10,6 @@ use crate::style::numbers;
 use crate::style::theme::{self, CAPTION, Palette};
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
-use handeye_workbench::guided;
 use handeye_workbench::model::{CellSource, FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;

@@ -69,6 +69,7 @@ pub struct App {
     pub(crate) desk: SessionThreads,
     pub(crate) connect: Connect,
     pub(crate) clock: Clock,
+    /// Has the window drawn again.
     pub waker: Waker,
     pub(crate) numbers: Numbers,
     /// The question that the solver was asked last.

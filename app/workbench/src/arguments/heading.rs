@@ -1,4 +1,5 @@
 //! Headings that the help lists options under. An option has the same one in every command.
+#![expect(missing_docs, reason = "each says what it is")]
 
 pub const ACCESS: &str = "Access";
 pub const BOARD: &str = "Motion of the board";

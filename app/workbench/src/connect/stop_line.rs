@@ -30,8 +30,11 @@ pub struct StopLine {
 
 /// What a stop reaches in the cell that is worked with.
 pub struct Ends {
+    /// The motions that wait.
     pub desk: Arc<MotionQueue>,
+    /// The thread that controls the simulation.
     pub control: Sender<Request<ControlTask>>,
+    /// The time of the window.
     pub clock: Clock,
 }
 

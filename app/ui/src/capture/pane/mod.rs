@@ -19,7 +19,6 @@ use crate::style::marks::{self, Marks};
 use crate::style::theme::{self, Palette, Tone};
 use crate::taught::pane::sequence;
 use handeye_wording::text;
-use handeye_workbench::by_hand;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, Moves, PoseSequence};
 use handeye_workbench::scene::Standing;

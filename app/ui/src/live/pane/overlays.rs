@@ -13,7 +13,6 @@ use super::place::Place;
 use super::project::{Projector, board_lines};
 use crate::capture::rows::{self, CaptureTable};
 use crate::style::marks::{self, Marks};
-use handeye_workbench::by_hand;
 use handeye_workbench::model::Model;
 use handeye_workbench::tr;
 

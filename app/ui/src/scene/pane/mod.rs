@@ -32,7 +32,6 @@ use captures::Spot;
 use eye::{Eye, Side};
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
-use handeye_workbench::keep_out;
 use handeye_workbench::keep_out::state::with_drawn;
 use handeye_workbench::model::{Model, SceneView};
 use handeye_workbench::scene::fitted_view;
