@@ -140,6 +140,39 @@ fn a_hundred_clients_that_never_read_share_64_mib_and_leave_nothing_behind() {
     println!("resident afterwards {} MB", memory(cell.id(), "VmRSS:") / 1_000_000);
 }
 
+/// Sends a signal, by its name.
+#[cfg(target_os = "linux")]
+fn signal(pid: u32, name: &str) {
+    let status = Command::new("kill").args(["-s", name, &pid.to_string()]).status().expect("kill is there");
+    assert!(status.success(), "{name}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn unfinished_requests_that_come_all_in_one_turn_share_64_mib_too() {
+    const CLIENTS: usize = 200;
+    const REQUEST: usize = 1 << 20;
+    // What the allocator keeps while one connection is let go for the next. Without a bound it is 200 MiB and more.
+    const BESIDE: u64 = 40 << 20;
+    let cell = CellProcess::start(&[]);
+    let (mut arm, _camera) = connect(&cell);
+    let before = memory(cell.id(), "VmRSS:");
+    let mut clients: Vec<TcpStream> = (0..CLIENTS).map(|_| dial(cell.port())).collect();
+    clients.iter_mut().for_each(hostile::introduce);
+    let head = [&[1, 0, 2][..], &(REQUEST as u64).to_be_bytes()].concat();
+    let unfinished = [head, vec![0; REQUEST - 1]].concat();
+    // A cell that stands still finds all of them when it goes on.
+    signal(cell.id(), "STOP");
+    for client in &mut clients {
+        client.set_write_timeout(Some(PATIENCE)).expect("an option");
+        client.write_all(&unfinished).expect("the system takes it");
+    }
+    signal(cell.id(), "CONT");
+    arm.joint_values().expect("whoever finishes a request is served");
+    let most = memory(cell.id(), "VmHWM:");
+    assert!(most < before + (64 << 20) + BESIDE, "{most} bytes, {before} before");
+}
+
 /// Ends a process with the test.
 struct Ends(Child);
 

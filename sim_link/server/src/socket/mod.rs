@@ -187,8 +187,9 @@ impl Loop {
                 }
                 self.reply();
             }
+            // After each: together they may send more in one turn than there is room for.
+            self.keep_within_budget();
         }
-        self.keep_within_budget();
     }
 
     /// Sends what the engine has answered.
