@@ -101,11 +101,7 @@ impl Driver {
         spawned("driver-errors", Box::new(move || threads::collect_errors(&listening, errors)))?;
 
         shared.send(&ToDriver::Hello { protocol: PROTOCOL, workbench: env!("CARGO_PKG_VERSION").to_owned() })?;
-        let greeted = shared.wait(options.hello, Some(cancel), |inner| {
-            let hello = inner.hello.clone().map(|hello| Some((hello, inner.arm.clone())));
-            hello.or_else(|| options.halt.is_cancelled().then_some(None))
-        })?;
-        let Some((hello, arm)) = greeted.flatten() else {
+        let Some((hello, arm)) = greeted(&shared, cancel)? else {
             let last_line = shared.lock().log.last_printed();
             let why = if cancel.is_cancelled() || options.halt.is_cancelled() {
                 Ending::ClosedHere
@@ -319,6 +315,24 @@ impl Drop for Owner {
             && watch.join().is_err()
         {
             tracing::error!(driver = %self.shared.driver, "the thread that watches the driver had failed");
+        }
+    }
+}
+
+/// What the driver says of itself, and the chain of its joints; `None` when it has not in time, or is not to be started any more.
+#[expect(clippy::type_complexity, reason = "hello and chain")]
+fn greeted(shared: &Shared, cancel: &CancelToken) -> Result<Option<(Arc<Hello>, Option<Arc<Arm>>)>, DriverError> {
+    let options = &shared.options;
+    let prepared_until = Instant::now() + options.preparation;
+    loop {
+        let before = shared.lock().preparations;
+        let greeted = shared.wait(options.hello, Some(cancel), |inner| {
+            let hello = inner.hello.clone().map(|hello| Some((hello, inner.arm.clone())));
+            hello.or_else(|| options.halt.is_cancelled().then_some(None))
+        })?;
+        let is_prepared = shared.lock().preparations > before && Instant::now() < prepared_until;
+        if greeted.is_some() || cancel.is_cancelled() || !is_prepared {
+            return Ok(greeted.flatten());
         }
     }
 }

@@ -37,6 +37,14 @@ pub enum DriverError {
         /// How it ended.
         why: Ending,
     },
+    /// Its start goes on.
+    #[error("the driver `{driver}` is being prepared: {what}")]
+    Preparing {
+        /// Its command or address.
+        driver: String,
+        /// What is being done, as it says.
+        what: String,
+    },
     /// It does not say that it can.
     #[error("the driver `{driver}` cannot do this: it has no `{ability}` in `can`")]
     Cannot {

@@ -8,8 +8,12 @@ use handeye_geometry::progress::CancelToken;
 
 use super::cell::{DriverCell, DriverCellSpec};
 use super::error::DriverError;
-use super::options::DriverOptions;
+use super::options::{DriverOptions, Preparing};
+use super::pending::PendingStart;
 use super::starts::{Failure, Permit, Starts};
+
+/// How long until a start that is being prepared is looked at again.
+const LOOK_AGAIN: Duration = Duration::from_millis(500);
 
 /// Keeps a cell running. Threads ask it for the cell whenever theirs is gone; what it gives is the same cell for all.
 ///
@@ -31,6 +35,8 @@ pub struct DriverHost {
 #[derive(Debug, Default)]
 struct Kept {
     cell: Option<DriverCell>,
+    /// A start that is under way.
+    pending: Option<PendingStart>,
     starts: Starts,
     /// Why there is none.
     error: Option<DriverError>,
@@ -39,9 +45,9 @@ struct Kept {
 /// Why there is no cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoCell {
-    /// Starts came to nothing, and the next is after a pause.
+    /// Starts came to nothing and the next is after a pause, or the one under way takes long.
     Later {
-        /// Why the last one did.
+        /// Why the last one did, or [`DriverError::Preparing`].
         error: DriverError,
         /// How many in a row.
         tries: u32,
@@ -102,28 +108,45 @@ impl DriverHost {
         // Before the question whether it rests: a rest that is wanted after that cancels this one.
         let halt = self.halt().clone();
         if self.rests.load(Ordering::Acquire) {
+            kept.pending = None;
             return Err(NoCell::Rests { error: kept.error.clone() });
         }
+        let pending = match kept.pending.take() {
+            Some(pending) => pending,
+            None => self.begin(&mut kept, halt, cancel)?,
+        };
+        let halt = pending.halt.clone();
+        match pending.wait() {
+            Err((pending, error)) => {
+                kept.pending = Some(pending);
+                // The one under way is a try, too.
+                Err(NoCell::Later { error, tries: kept.starts.tries() + 1, pause: LOOK_AGAIN })
+            }
+            Ok(Ok(cell)) => {
+                kept.starts.began(self.now_s());
+                Ok(kept.cell.insert(cell).clone())
+            }
+            Ok(Err(error)) if halt.is_cancelled() => Err(NoCell::Rests { error: kept.error.clone().or(Some(error)) }),
+            Ok(Err(error)) => Err(self.failed(&mut kept, error)),
+        }
+    }
+
+    /// Begins a start, if there may be one now.
+    fn begin(&self, kept: &mut Kept, halt: CancelToken, cancel: &CancelToken) -> Result<PendingStart, NoCell> {
         let (permit, error) = (kept.starts.permit(self.now_s()), kept.error.clone());
         if let (Permit::In(_) | Permit::No, Some(error)) = (permit, error) {
             return Err(refusal(permit, error, kept.starts.tries()));
         }
-        let options = DriverOptions { halt, ..self.options.clone() };
-        match DriverCell::start(&self.spec, &options, cancel) {
-            Ok(cell) => {
-                kept.starts.began(self.now_s());
-                Ok(kept.cell.insert(cell).clone())
-            }
-            Err(error) if options.halt.is_cancelled() => {
-                Err(NoCell::Rests { error: kept.error.clone().or(Some(error)) })
-            }
-            Err(error) => {
-                kept.error = Some(error.clone());
-                let now_s = self.now_s();
-                kept.starts.failed(now_s, kind(&error));
-                Err(refusal(kept.starts.permit(now_s), error, kept.starts.tries()))
-            }
-        }
+        let options = DriverOptions { halt, preparing: Preparing::default(), ..self.options.clone() };
+        PendingStart::begin(&self.spec, options, cancel).map_err(|error| self.failed(kept, error))
+    }
+
+    /// Counts a start that came to nothing.
+    fn failed(&self, kept: &mut Kept, error: DriverError) -> NoCell {
+        kept.error = Some(error.clone());
+        let now_s = self.now_s();
+        kept.starts.failed(now_s, kind(&error));
+        refusal(kept.starts.permit(now_s), error, kept.starts.tries())
     }
 
     /// Starts nothing until [`Self::again`], and gives up the start under way. A cell that works goes on. Waits for nothing.
@@ -152,6 +175,13 @@ impl DriverHost {
 
     fn now_s(&self) -> f64 {
         self.options.timebase.now_s()
+    }
+}
+
+impl Drop for DriverHost {
+    fn drop(&mut self) {
+        // A start under way would go on for nobody.
+        self.halt().cancel();
     }
 }
 

@@ -74,3 +74,31 @@ fn a_start_under_way_is_given_up_when_a_person_has_had_enough() {
     });
     assert!(began.elapsed() < PATIENCE, "the wait for `hello` was given up");
 }
+
+#[test]
+fn a_driver_that_is_being_prepared_says_so_to_all_who_ask_and_is_started_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (noted, ready) = (folder.path().join("noted"), folder.path().join("ready"));
+    let preparing = r#"{"type":"preparing","text":"packages are fetched"}"#;
+    let hello = r#"{"type":"hello","protocol":1,"name":"slow","can":["image"],"camera":{"width":4,"height":2}}"#;
+    let prepare = format!("until [ -e '{}' ]; do echo '{preparing}'; sleep 0.05; done", ready.display());
+    let mut host = host(&noted, &format!("{prepare}; echo '{hello}'; cat > {}", folder.path().join("heard").display()));
+    // Shorter than the preparation.
+    host.options.hello = Duration::from_millis(300);
+    let cancel = CancelToken::default();
+    let began = Instant::now();
+    while began.elapsed() < 3 * host.options.hello {
+        let NoCell::Later { error, .. } = host.cell(&cancel).unwrap_err() else { panic!("it goes on") };
+        assert!(matches!(&error, DriverError::Preparing { what, .. } if what == "packages are fetched"), "{error}");
+    }
+    std::fs::write(&ready, "").unwrap();
+    let until = Instant::now() + PATIENCE;
+    let cell = loop {
+        match host.cell(&cancel) {
+            Ok(cell) => break cell,
+            Err(NoCell::Later { error: DriverError::Preparing { .. }, .. }) if Instant::now() < until => {}
+            Err(why) => panic!("{why:?}"),
+        }
+    };
+    assert_eq!((cell.robot().hello().name.as_str(), starts(&noted)), ("slow", 1));
+}

@@ -11,7 +11,7 @@ use super::error::Ending;
 use super::log::LogLines;
 use super::message::{
     Ability, AnswerMessage, DepthMessage, DisarmedMessage, FromDriver, Hello, ImageMessage, LogLevel, LogMessage,
-    PongMessage, StateMessage,
+    PongMessage, PreparingMessage, StateMessage,
 };
 use super::placement::ChainWatch;
 use super::states::{Reading, States};
@@ -102,6 +102,8 @@ pub struct Inner {
     pub arm: Option<Arc<Arm>>,
     /// What its states say of it.
     pub chain: ChainWatch,
+    /// How often it has said that it is being prepared.
+    pub preparations: u64,
     /// Why it is over.
     pub ending: Option<Ending>,
     pub read_up: ReadUp,
@@ -148,6 +150,13 @@ impl Inner {
         let is_early = self.hello.is_none();
         match message {
             FromDriver::Hello(hello) => self.take_hello(*hello, arrived_s),
+            FromDriver::Preparing(PreparingMessage { text }) => {
+                if self.preparations == 0 {
+                    self.log.add(LogLevel::Info, false, &text);
+                }
+                self.preparations += 1;
+                Ok(())
+            }
             FromDriver::Log(LogMessage { level, text }) => {
                 self.log.add(level, false, &text);
                 Ok(())

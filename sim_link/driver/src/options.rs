@@ -1,5 +1,6 @@
 //! How long to wait for what.
 
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use handeye_geometry::progress::CancelToken;
@@ -11,6 +12,8 @@ use super::clock::Timebase;
 pub struct DriverOptions {
     /// Longest wait for the driver's `hello`: a camera takes its time to open.
     pub hello: Duration,
+    /// Longest preparation: as long as the driver says `preparing`, [`Self::hello`] begins again.
+    pub preparation: Duration,
     /// How often a ping is sent.
     pub ping_every: Duration,
     /// A driver without a pong for so long is gone.
@@ -25,12 +28,30 @@ pub struct DriverOptions {
     pub timebase: Timebase,
     /// Gives up a start that waits for `hello`.
     pub halt: CancelToken,
+    /// What a start waits for.
+    pub preparing: Preparing,
+}
+
+/// What a driver that is being prepared says, for whoever waits for its start. Clones are the same.
+#[derive(Debug, Clone, Default)]
+pub struct Preparing(Arc<Mutex<Option<String>>>);
+
+impl Preparing {
+    /// What it said last, for people.
+    pub fn text(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub(super) fn say(&self, text: &str) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_owned());
+    }
 }
 
 impl Default for DriverOptions {
     fn default() -> Self {
         Self {
             hello: Duration::from_secs(10),
+            preparation: Duration::from_mins(10),
             ping_every: Duration::from_millis(200),
             silence: Duration::from_secs(2),
             answer: Duration::from_secs(2),
@@ -38,6 +59,7 @@ impl Default for DriverOptions {
             farewell: Duration::from_secs(1),
             timebase: Timebase::start(),
             halt: CancelToken::default(),
+            preparing: Preparing::default(),
         }
     }
 }

@@ -8,7 +8,7 @@ use handeye_geometry::progress::CancelToken;
 
 use super::error::{DriverError, Ending};
 pub use super::inner::{Burial, FrameRequest, Inner, Progress};
-use super::message::ToDriver;
+use super::message::{FromDriver, ToDriver};
 use super::options::DriverOptions;
 use super::wire::{Excerpt, Incoming, WireError};
 
@@ -180,6 +180,9 @@ impl Shared {
     /// [`WireError`] for one that does not belong where it stands.
     pub fn take(&self, incoming: Incoming, arrived_s: f64) -> Result<(), WireError> {
         let Incoming { number, line, message, bytes } = incoming;
+        if let FromDriver::Preparing(preparing) = &message {
+            self.options.preparing.say(&preparing.text);
+        }
         let taken = self.update(|inner| inner.take(message, bytes, arrived_s));
         taken.map_err(|problem| WireError { number, excerpt: Excerpt::of(line.as_bytes()), problem })
     }

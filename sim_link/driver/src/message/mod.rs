@@ -141,6 +141,13 @@ fn info() -> LogLevel {
     LogLevel::Info
 }
 
+/// Before `hello`: what the driver needs is being fetched or made, which takes long.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PreparingMessage {
+    /// What is being done, for people.
+    pub text: String,
+}
+
 /// What a driver sends. Bytes that follow a line are with whoever read them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FromDriver {
@@ -164,6 +171,8 @@ pub enum FromDriver {
     Refused(AnswerMessage),
     /// The driver no longer moves the arm, by itself.
     Disarmed(DisarmedMessage),
+    /// `hello` comes later.
+    Preparing(PreparingMessage),
     /// For the log.
     Log(LogMessage),
     /// The driver cannot go on and ends.
@@ -204,6 +213,7 @@ impl FromDriver {
             "stopped" => Self::Stopped(body(kind, line)?),
             "refused" => Self::Refused(body(kind, line)?),
             "disarmed" => Self::Disarmed(body(kind, line)?),
+            "preparing" => Self::Preparing(body(kind, line)?),
             "log" => Self::Log(body(kind, line)?),
             "error" => Self::Error(body(kind, line)?),
             _ => Self::Unknown(header.kind),

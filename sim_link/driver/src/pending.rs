@@ -1,0 +1,66 @@
+//! A start of drivers that goes on in a thread of its own, since one that is being prepared takes minutes.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
+use handeye_core::progress::CancelToken;
+
+use super::cell::{DriverCell, DriverCellSpec};
+use super::error::DriverError;
+use super::options::{DriverOptions, Preparing};
+
+/// How often a preparation is looked for.
+const POLL: Duration = Duration::from_millis(20);
+
+/// The start.
+#[derive(Debug)]
+pub struct PendingStart {
+    driver: String,
+    started: Receiver<Result<DriverCell, DriverError>>,
+    preparing: Preparing,
+    /// Gives it up.
+    pub halt: CancelToken,
+}
+
+impl PendingStart {
+    /// Begins it. Raising `cancel` gives it up as well.
+    ///
+    /// # Errors
+    /// [`DriverError::Start`] where there is no thread for it.
+    pub fn begin(spec: &DriverCellSpec, options: DriverOptions, cancel: &CancelToken) -> Result<Self, DriverError> {
+        let (send, started) = sync_channel(1);
+        let (spec, cancel) = (spec.clone(), cancel.clone());
+        let driver = spec.robot.to_string();
+        let (halt, preparing) = (options.halt.clone(), options.preparing.clone());
+        let thread = std::thread::Builder::new().name("driver-start".into());
+        let began = thread.spawn(move || {
+            // Nobody waits for it any more: the cell that is dropped ends its drivers.
+            let _dropped = send.send(DriverCell::start(&spec, &options, &cancel)).is_err();
+        });
+        match began {
+            Ok(_) => Ok(Self { driver, started, preparing, halt }),
+            Err(error) => Err(DriverError::Start { command: driver, why: error.to_string() }),
+        }
+    }
+
+    /// Waits for its end, or until the driver says that it is being prepared: then it goes on.
+    ///
+    /// # Errors
+    /// The start itself, with what is being done.
+    pub fn wait(self) -> Result<Result<DriverCell, DriverError>, (Self, DriverError)> {
+        loop {
+            match self.started.recv_timeout(POLL) {
+                Ok(started) => return Ok(started),
+                Err(RecvTimeoutError::Disconnected) => {
+                    let why = "the thread that starts it failed".to_owned();
+                    return Ok(Err(DriverError::Start { command: self.driver, why }));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            if let Some(what) = self.preparing.text() {
+                let error = DriverError::Preparing { driver: self.driver.clone(), what };
+                return Err((self, error));
+            }
+        }
+    }
+}
