@@ -7,8 +7,7 @@ use handeye_capture::{Machine, Plan, Progress, Refusal, RobotRate, STILL_RATE_RA
 use handeye_images::gray_from_rgb;
 
 use super::super::limits;
-use super::super::message::Ability;
-use super::{Check, Run, gone, passed, skipped, warning, wrong};
+use super::{Checked, Found, Run, wrong};
 
 /// How long robot and image may take to come to rest \[s\]: as long as in the window.
 const SETTLE_S: f64 = 10.0;
@@ -17,16 +16,9 @@ const LONGEST: Duration = Duration::from_mins(1);
 /// So many images in a row without a pose are the driver's doing; one may be that of a busy machine.
 const WITHOUT_POSE: u32 = 3;
 
-impl Run<'_> {
-    pub(super) fn capture(&self) -> Result<Check, Check> {
-        const NAME: &str = "capture";
-        if !self.can(Ability::Image) {
-            return Ok(skipped(NAME, "it has no images"));
-        }
-        if !self.can(Ability::State) {
-            return Ok(skipped(NAME, "it sends no states: another driver has the robot, or a person types its poses"));
-        }
-        let (driver, timebase) = (self.driver, self.driver.timebase());
+impl Run {
+    pub(super) fn capture(&self) -> Checked {
+        let (driver, timebase) = (&self.driver, self.driver.timebase());
         let plan = Plan {
             frames: 1,
             settle_limit_s: SETTLE_S,
@@ -38,22 +30,20 @@ impl Run<'_> {
         let until = Instant::now() + LONGEST;
         let (mut after, mut number, mut without_pose) = (None, 0, 0);
         while Instant::now() < until && !self.cancel.is_cancelled() {
-            let image = gone(NAME, driver.image(after, limits::IMAGE_WAIT, self.cancel))?;
-            let Some(image) = image else {
-                return Err(wrong(NAME, format!("no image for {} s", limits::IMAGE_WAIT.as_secs())));
+            let Some(image) = driver.image(after, limits::IMAGE_WAIT, &self.cancel)? else {
+                return wrong(format!("no image for {} s", limits::IMAGE_WAIT.as_secs()));
             };
-            self.of_this_clock(NAME, image.stamp_s)?;
-            let robot = gone(NAME, driver.robot_at(image.stamp_s, limits::STATE_AFTER_IMAGE))?;
-            let robot = match robot {
+            after = Some(image.stamp_s);
+            self.of_this_clock(image.stamp_s)?;
+            let robot = match driver.robot_at(image.stamp_s, limits::STATE_AFTER_IMAGE)? {
                 Ok(robot) => robot,
-                Err(why) => {
+                Err(why) if without_pose + 1 == WITHOUT_POSE => {
+                    return wrong(format!(
+                        "an image has no pose of the robot: {why}. States go on while the camera works"
+                    ));
+                }
+                Err(_) => {
                     without_pose += 1;
-                    if without_pose == WITHOUT_POSE {
-                        let said =
-                            format!("an image has no pose of the robot: {why}. States go on while the camera works");
-                        return Err(wrong(NAME, said));
-                    }
-                    after = Some(image.stamp_s);
                     continue;
                 }
             };
@@ -71,22 +61,20 @@ impl Run<'_> {
                 depth: image.depth.as_ref(),
                 far_plane_m: f32::INFINITY,
             });
-            after = Some(image.stamp_s);
             match progress {
                 Progress::Waits(_) => {}
                 Progress::Complete => {
-                    return Ok(passed(NAME, format!("image and robot at rest after {number} images")));
+                    return Ok(Found::Passed(format!("image and robot at rest after {number} images")));
                 }
-                Progress::Refused(refusal) => return not_at_rest(NAME, &refusal),
+                Progress::Refused(refusal) => return not_at_rest(&refusal),
             }
         }
-        Err(wrong(NAME, format!("{number} images in {} s do not make a capture", LONGEST.as_secs())))
+        wrong(format!("{number} images in {} s do not make a capture", LONGEST.as_secs()))
     }
 }
 
 /// Why images and states make no capture.
-fn not_at_rest(name: &'static str, refusal: &Refusal) -> Result<Check, Check> {
-    let still_mrad_s = STILL_RATE_RAD_S * 1e3;
+fn not_at_rest(refusal: &Refusal) -> Checked {
     match *refusal {
         Refusal::RobotMoves { after_s, rate } => {
             let rate = match rate {
@@ -95,20 +83,15 @@ fn not_at_rest(name: &'static str, refusal: &Refusal) -> Result<Check, Check> {
                     format!("the tip goes by {:.2} mm and {:.2} mrad a second", m_s * 1e3, rad_s * 1e3)
                 }
             };
-            Err(wrong(
-                name,
-                format!(
-                    "by its states the robot moves on for {after_s:.0} s: {rate} from image to image, and a capture waits until \
-                     that is under {still_mrad_s:.0}. Let the arm stand; where it does, its states have too much noise"
-                ),
+            wrong(format!(
+                "by its states the robot moves on for {after_s:.0} s: {rate} from image to image, and a capture waits until that is \
+                 under {:.0}. Let the arm stand; where it does, its states have too much noise",
+                STILL_RATE_RAD_S * 1e3
             ))
         }
-        Refusal::ImageChanges { after_s } => Ok(warning(
-            name,
-            format!(
-                "the images change for {after_s:.0} s: a capture waits until nothing moves in them and the light is even"
-            ),
-        )),
-        _ => Err(wrong(name, "the stamps of its images stand still")),
+        Refusal::ImageChanges { after_s } => Ok(Found::Warning(format!(
+            "the images change for {after_s:.0} s: a capture waits until nothing moves in them and the light is even"
+        ))),
+        _ => wrong("the stamps of its images stand still"),
     }
 }

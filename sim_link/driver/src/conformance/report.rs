@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::super::error::{DriverError, Ending};
+
 /// How a check ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -14,6 +16,55 @@ pub enum Outcome {
     Failed,
     /// Not tried, because the driver does not say that it can, because it was not allowed, or after an earlier failure.
     Skipped,
+}
+
+/// What a check found that did not fail.
+#[derive(Debug)]
+pub(super) enum Found {
+    Passed(String),
+    Warning(String),
+    Skipped(&'static str),
+}
+
+/// What is wrong, and the number and the beginning of the line that it is about.
+#[derive(Debug)]
+pub(super) struct Wrong {
+    text: String,
+    line: Option<(u64, String)>,
+}
+
+/// How a check ends.
+pub(super) type Checked = Result<Found, Wrong>;
+
+/// A failure.
+pub(super) fn wrong<T>(text: impl Into<String>) -> Result<T, Wrong> {
+    Err(Wrong { text: text.into(), line: None })
+}
+
+impl Wrong {
+    /// With when it happened.
+    pub fn after(self, when: &str) -> Self {
+        Self { text: format!("{when}, {}", self.text), ..self }
+    }
+}
+
+impl From<DriverError> for Wrong {
+    fn from(error: DriverError) -> Self {
+        let mut line = None;
+        let text = match error {
+            DriverError::Gone { why: Ending::Broken(broken), .. } => {
+                line = Some((broken.number, broken.excerpt.to_string()));
+                broken.problem.to_string()
+            }
+            DriverError::Gone { why, .. } => format!("it {why}"),
+            DriverError::Refused { what, why, .. } => format!("it refuses {what}: {why}"),
+            DriverError::NoAnswer { what, after, .. } => {
+                format!("it has not answered {what} within {} s", after.as_secs_f64())
+            }
+            other => other.to_string(),
+        };
+        Self { text, line }
+    }
 }
 
 /// One check.
@@ -53,9 +104,18 @@ impl Report {
         Self { driver, protocol: crate::message::PROTOCOL, passed: true, checks: Vec::new(), log: Vec::new() }
     }
 
-    pub(super) fn add(&mut self, check: Check) {
-        self.passed &= check.outcome != Outcome::Failed;
-        self.checks.push(check);
+    /// Adds a check. Whether it has not failed.
+    pub(super) fn add(&mut self, name: &'static str, checked: Checked) -> bool {
+        let (outcome, text, line) = match checked {
+            Ok(Found::Passed(text)) => (Outcome::Passed, text, None),
+            Ok(Found::Warning(text)) => (Outcome::Warning, text, None),
+            Ok(Found::Skipped(text)) => (Outcome::Skipped, text.to_owned(), None),
+            Err(Wrong { text, line }) => (Outcome::Failed, text, line),
+        };
+        let (message, line) = line.unzip();
+        self.passed &= outcome != Outcome::Failed;
+        self.checks.push(Check { name, outcome, text, message, line });
+        outcome != Outcome::Failed
     }
 
     /// For people: a line for each check, and what failed with the line of the driver.
