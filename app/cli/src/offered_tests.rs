@@ -1,46 +1,62 @@
 //! What the window offers of each driver is what its subcommand takes.
 
+use std::path::Path;
+
 use clap::{Args as _, Command};
 
-use super::driver::DriverArgs;
+use super::driver::{DriverArgs, python};
 use handeye_driver::DriverSpec;
 use handeye_workbench::connect::drivers::offered::FieldKind::{Switch, Text, Word};
 use handeye_workbench::connect::drivers::offered::Rank::Needed;
 use handeye_workbench::connect::drivers::offered::{ALL, Field, ON, Offered, Part, Values, of_part, parse};
 
-/// Options that make no sense in a window, with the reason.
-const NOT_OFFERED: [(&str, &str); 1] = [("fake", "--listen")];
+/// Options that make no sense in a window: who listens is another driver, and RTDE has one port.
+const NOT_OFFERED: [(&str, &str); 2] = [("fake", "--listen"), ("ur-rtde", "--port")];
 
-fn subcommands() -> Vec<Command> {
-    let all = DriverArgs::augment_args(Command::new("driver"));
-    all.get_subcommands().filter(|command| command.get_name() != "test").cloned().collect()
+/// What an option is called, empty for an argument without one, and whether nothing goes without it.
+type Option = (String, bool);
+
+/// Those of a subcommand.
+fn of_clap(command: &Command) -> Vec<Option> {
+    let own = command.get_arguments().filter(|argument| argument.get_id() != "help");
+    own.map(|argument| {
+        let name = argument.get_long().map_or_else(String::new, |long| format!("--{long}"));
+        (name, argument.is_required_set())
+    })
+    .collect()
 }
 
-fn options(command: &Command) -> Vec<String> {
-    let own = command.get_arguments().filter(|argument| argument.get_id() != "help");
-    own.map(|argument| argument.get_long().map_or_else(String::new, |long| format!("--{long}"))).collect()
+/// Those of a driver in Python, as its file adds them to a parser, with that which all have.
+fn of_python(source: &str) -> Vec<Option> {
+    let added = source.split("add").filter_map(|call| {
+        let call = call.strip_prefix("_argument").unwrap_or(call).strip_prefix('(')?;
+        let (name, rest) = call.trim_start().strip_prefix('"')?.split_once('"')?;
+        let is_option = name.starts_with("--");
+        Some((if is_option { name.to_owned() } else { String::new() }, !is_option || rest.contains("required=True")))
+    });
+    added.chain([("--python".to_owned(), false)]).collect()
 }
 
 #[test]
 fn every_driver_that_comes_with_the_program_is_offered_with_every_option_it_has() {
-    let commands = subcommands();
+    let all = DriverArgs::augment_args(Command::new("driver"));
+    let is_driver = |command: &&Command| !["test", "eject"].contains(&command.get_name());
+    let commands: Vec<&Command> = all.get_subcommands().filter(is_driver).collect();
     assert_eq!(commands.len(), ALL.len());
-    for command in &commands {
+    for command in commands {
         let name = command.get_name();
         let offered = ALL.iter().find(|offered| offered.name == name).unwrap_or_else(|| panic!("{name}: not offered"));
-        for option in options(command) {
-            let is_field = offered.fields.iter().any(|field| field.option == option);
+        let file = python::ALL.iter().find(|shipped| shipped.name == name);
+        let options = file.map_or_else(|| of_clap(command), |file| of_python(file.source));
+        for (option, is_needed) in &options {
+            let field = offered.fields.iter().find(|field| field.option == option);
             let is_always = offered.camera_alone.contains(&option.as_str());
             let is_left_out = NOT_OFFERED.contains(&(name, option.as_str()));
-            assert!(is_field || is_always || is_left_out, "{name}: no field for {option}");
+            assert!(field.is_some() || is_always || is_left_out, "{name}: no field for {option}");
+            assert!(field.is_none_or(|field| *is_needed == (field.rank == Needed)), "{name}: {option}");
         }
         for field in offered.fields {
-            assert!(options(command).iter().any(|option| option == field.option), "{name}: {} is none", field.option);
-            let needed = command.get_arguments().find(|argument| {
-                argument.get_long().map_or_else(String::new, |long| format!("--{long}")) == field.option
-            });
-            let is_needed = needed.is_some_and(clap::Arg::is_required_set);
-            assert_eq!(is_needed, field.rank == Needed, "{name}: {}", field.option);
+            assert!(options.iter().any(|(option, _)| option == field.option), "{name}: {} is none", field.option);
         }
     }
 }
@@ -58,6 +74,18 @@ fn filled(offered: &Offered, part: Part) -> Values {
     offered.fields_of(part).map(|field| (field.option, value(field))).filter(|(_, value)| !value.is_empty()).collect()
 }
 
+/// The driver in Python, if it is one, takes the values of its options.
+fn is_taken_by_its_file(name: &str, options: &[String]) {
+    let Some(shipped) = python::ALL.iter().find(|shipped| shipped.name == name) else { return };
+    let Some(python) = handeye_geometry::testing::python() else { return };
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/drivers").join(shipped.file);
+    let mut command = std::process::Command::new(python);
+    // Help is what it prints once all before it is understood; its name is what has it take `--python` as well.
+    let output = command.arg(file).args(options).arg("--help").env(python::NAME_VARIABLE, name).output();
+    let output = output.expect("python runs");
+    assert!(output.status.success(), "{options:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
 #[test]
 fn a_command_line_is_what_the_program_takes_and_is_read_back_as_it_was() {
     for part in [Part::Robot, Part::Camera] {
@@ -69,6 +97,7 @@ fn a_command_line_is_what_the_program_takes_and_is_read_back_as_it_was() {
             if let Err(error) = all.try_get_matches_from(&words[1..]) {
                 panic!("{command}: {error}");
             }
+            is_taken_by_its_file(offered.name, &words[3..]);
             let (again, read) = parse(&command, part).expect("its own command line");
             assert_eq!((again.name, read), (offered.name, values), "{command}");
         }

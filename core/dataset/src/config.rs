@@ -221,16 +221,6 @@ impl Config {
     }
 }
 
-/// The keys of `[robot]` as a text of their own.
-pub(super) fn robot_alone(file: &Path, text: &str) -> Result<RobotConfig, DatasetError> {
-    let row = |span: &std::ops::Range<usize>| line_of(text.as_bytes(), span.start);
-    let raw: Spanned<RawRobot> =
-        toml::from_str::<RawRobot>(text).map(|raw| Spanned::new(0..text.len(), raw)).map_err(|e| {
-            DatasetError::new(file, e.span().as_ref().map(row), DatasetProblem::Toml(one_line(&e.message())))
-        })?;
-    robot_config(&raw).map_err(|(span, problem)| DatasetError::new(file, Some(row(&span)), problem))
-}
-
 fn robot_config(raw: &Spanned<RawRobot>) -> Result<RobotConfig, Spanning> {
     let whole = raw.span();
     let raw = raw.get_ref();

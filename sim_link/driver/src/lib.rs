@@ -32,7 +32,6 @@ mod chain;
 mod client;
 pub mod clock;
 pub mod conformance;
-pub mod drivers;
 mod error;
 pub mod fake;
 mod family;

@@ -1,17 +1,13 @@
 //! `handeye driver`: a conformance run of a driver, and the drivers that come with the workbench.
 
 mod fake;
-mod folder;
-mod rosbridge;
+pub(crate) mod python;
 mod test;
-mod ur_rtde;
-#[cfg(target_os = "linux")]
-mod v4l;
 
 use clap::{Args, Subcommand};
-use handeye_driver::drivers::{self, Device};
 
 use super::Failure;
+use python::{EjectArgs, PythonArgs};
 
 pub const EXAMPLES: &str = "Examples:
   handeye driver test \"handeye driver fake\" --allow-motion
@@ -39,48 +35,43 @@ enum DriverCommand {
     /// Be a driver with the built-in cell behind it, on standard input and output or over TCP.
     #[command(after_help = "Examples:\n  handeye driver test \"handeye driver fake\" --allow-motion")]
     Fake(fake::FakeArgs),
+    /// Write one of the drivers below as a Python file, to change it.
+    #[command(after_help = "Examples:\n  handeye driver eject ur-rtde --out my_drivers")]
+    Eject(EjectArgs),
     /// Be a driver that reads a controller of Universal Robots through RTDE.
     #[command(
+        disable_help_flag = true,
         after_help = "Examples:\n  handeye driver test \"handeye driver ur-rtde --host 192.168.0.10 --arm ur5e\""
     )]
-    UrRtde(ur_rtde::UrRtdeArgs),
+    UrRtde(PythonArgs),
     /// Be a driver that reads ROS 1 or ROS 2 through a rosbridge.
-    #[command(after_help = ROSBRIDGE_EXAMPLES)]
-    Rosbridge(rosbridge::RosbridgeArgs),
+    #[command(disable_help_flag = true, after_help = ROSBRIDGE_EXAMPLES)]
+    Rosbridge(PythonArgs),
     /// Be a driver that shows each image that comes into a folder, with its pose.
     #[command(
+        disable_help_flag = true,
         after_help = "Examples:\n  handeye driver folder captures --length-unit mm --rotation rpy \\\n      --angle-unit deg \
                       --pose base_from_tip"
     )]
-    Folder(folder::FolderArgs),
+    Folder(PythonArgs),
     /// Be a driver of a USB camera, or another one of Video4Linux.
     #[cfg(target_os = "linux")]
     #[command(
+        disable_help_flag = true,
         after_help = "Examples:\n  handeye driver test \"handeye driver v4l --device /dev/video0 --size 1280x720\""
     )]
-    V4l(v4l::V4lArgs),
+    V4l(PythonArgs),
 }
 
 pub fn run(args: &DriverArgs) -> Result<(), Failure> {
     match &args.command {
         DriverCommand::Test(args) => test::run(args),
         DriverCommand::Fake(args) => fake::run(args),
-        DriverCommand::UrRtde(args) => ur_rtde::run(args),
-        DriverCommand::Rosbridge(args) => rosbridge::run(args),
-        DriverCommand::Folder(args) => folder::run(args),
+        DriverCommand::Eject(args) => python::eject(args),
+        DriverCommand::UrRtde(args) => python::run(&python::UR_RTDE, args),
+        DriverCommand::Rosbridge(args) => python::run(&python::ROSBRIDGE, args),
+        DriverCommand::Folder(args) => python::run(&python::FOLDER, args),
         #[cfg(target_os = "linux")]
-        DriverCommand::V4l(args) => v4l::run(args),
+        DriverCommand::V4l(args) => python::run(&python::V4L, args),
     }
-}
-
-/// Speaks for a device on standard input and output until the workbench leaves.
-fn serve(device: impl Device) -> Result<(), Failure> {
-    drivers::serve(device, std::io::stdin(), std::io::stdout()).map_err(Failure::failed)
-}
-
-/// Width and height in pixels.
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let number = |text: &str| text.parse::<u32>().ok().filter(|&pixels| pixels > 0);
-    let parts = text.split_once(['x', '×']).and_then(|(width, height)| Some((number(width)?, number(height)?)));
-    parts.ok_or_else(|| "width and height in pixels, such as 1280x720".into())
 }

@@ -4,6 +4,7 @@ use clap::Args;
 use handeye_driver::conformance::{self, ConformanceOptions};
 use handeye_driver::{BadSpec, DriverSpec};
 
+use super::python;
 use crate::output::Output;
 use crate::{Failure, out, solve};
 use handeye_workbench::arguments::heading;
@@ -29,6 +30,10 @@ pub struct TestArgs {
 pub fn run(args: &TestArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let spec = spec(args).map_err(Failure::unusable)?;
+    if let DriverSpec::Command(words) = &spec {
+        // Here, where its progress is seen: of a driver only what is wrong with it is printed.
+        python::prepare(words)?;
+    }
     let options = ConformanceOptions { allow_motion: args.allow_motion, ..ConformanceOptions::default() };
     let report = conformance::run(&spec, &options, &cancel).map_err(Failure::unusable)?;
     if let Some(output) = &args.json {

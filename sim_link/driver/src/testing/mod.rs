@@ -3,6 +3,7 @@
 mod ros;
 mod rosbridge_server;
 mod rtde_robot;
+mod rtde_wire;
 
 pub use ros::{RosScene, RosVersion};
 pub use rosbridge_server::{RosbridgeServer, Topic};

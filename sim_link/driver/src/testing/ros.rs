@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use serde_json::{Value, json};
 
 use super::Topic;
@@ -76,6 +77,15 @@ impl RosScene {
         json!({"stamp": stamp, "frame_id": frame})
     }
 
+    /// Where `tool0` is in `base_link`.
+    pub fn base_from_tip(self) -> Isometry3<f64> {
+        let isometry = |(t, q): Placed| {
+            let rotation = UnitQuaternion::from_quaternion(Quaternion::from(q));
+            Isometry3::from_parts(t.into(), rotation)
+        };
+        isometry(LINK_1) * isometry(TOOL0)
+    }
+
     fn transform(self, time_s: f64, parent: &str, child: &str, (t, q): Placed) -> Value {
         json!({
             "header": self.header(time_s, parent),
@@ -108,6 +118,12 @@ impl RosScene {
         (0..3 * self.width * self.height).map(|i| (i * 7 % 251) as u8).collect()
     }
 
+    /// Depths in millimetres, two bytes each, little end first.
+    pub fn depths(self) -> Vec<u8> {
+        let pixels = u16::try_from(self.width * self.height).unwrap_or(u16::MAX);
+        (0..pixels).flat_map(|i| (1000 + i).to_le_bytes()).collect()
+    }
+
     /// Rows are padded by two bytes.
     fn image(self, time_s: f64) -> Value {
         let row = 3 * self.width as usize;
@@ -116,10 +132,8 @@ impl RosScene {
     }
 
     fn depth(self, time_s: f64) -> Value {
-        let pixels = u16::try_from(self.width * self.height).unwrap_or(u16::MAX);
-        let data: Vec<u8> = (0..pixels).flat_map(|i| (1000 + i).to_le_bytes()).collect();
         // Of the same exposure: image and depth have the same stamp, which is a multiple of their period.
-        self.raw(time_s, "16UC1", 2 * self.width as usize, &data)
+        self.raw(time_s, "16UC1", 2 * self.width as usize, &self.depths())
     }
 
     fn raw(self, time_s: f64, encoding: &str, step: usize, data: &[u8]) -> Value {

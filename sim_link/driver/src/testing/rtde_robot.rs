@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use crate::drivers::ur_rtde::wire::{self, Unpacker};
+use super::rtde_wire::{self as wire, Unpacker};
 
 /// What the controller shows and how it misbehaves.
 #[derive(Debug, Clone)]
@@ -17,21 +17,15 @@ pub struct RtdeScript {
     pub software: [u32; 4],
     /// Outputs by name; all others are of the type NOT_FOUND.
     pub outputs: BTreeMap<&'static str, Output>,
-    /// Whether version 2 of the protocol is accepted.
-    pub accepts_version_2: bool,
     /// After so many values the stream stops, and the connection stays.
     pub silent_after: Option<usize>,
     /// After so many values the connection is closed.
     pub closes_after: Option<usize>,
-    /// What is sent for the first value instead of it.
-    pub garbage: Option<Vec<u8>>,
 }
 
 /// A value of an output.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Output {
-    /// `DOUBLE`.
-    Double(f64),
     /// The time since the controller was started, `DOUBLE`.
     Time,
     /// `VECTOR6D`.
@@ -47,7 +41,7 @@ pub enum Output {
 impl Output {
     fn type_name(&self) -> &'static str {
         match self {
-            Self::Double(_) | Self::Time => "DOUBLE",
+            Self::Time => "DOUBLE",
             Self::Vector6(_) => "VECTOR6D",
             Self::Int(_) => "INT32",
             Self::Uint(_) => "UINT32",
@@ -57,7 +51,6 @@ impl Output {
 
     fn write(&self, time_s: f64, to: &mut Vec<u8>) {
         match self {
-            Self::Double(value) => to.extend(value.to_be_bytes()),
             Self::Time => to.extend(time_s.to_be_bytes()),
             Self::Vector6(values) => values.iter().for_each(|value| to.extend(value.to_be_bytes())),
             Self::Int(value) => to.extend(value.to_be_bytes()),
@@ -84,14 +77,7 @@ impl Default for RtdeScript {
             ("safety_status_bits", Output::Uint(1)),
             ("actual_digital_input_bits", Output::Long(5)),
         ];
-        Self {
-            software: [5, 15, 0, 1],
-            outputs: outputs.into(),
-            accepts_version_2: true,
-            silent_after: None,
-            closes_after: None,
-            garbage: None,
-        }
+        Self { software: [5, 15, 0, 1], outputs: outputs.into(), silent_after: None, closes_after: None }
     }
 }
 
@@ -105,18 +91,12 @@ pub struct RtdeRobot {
 }
 
 impl RtdeRobot {
-    /// On any free port of 127.0.0.1.
-    pub fn start(script: RtdeScript) -> std::io::Result<Self> {
-        Self::start_at((Ipv4Addr::LOCALHOST, 0).into(), script)
-    }
-
-    /// On port 30004 of an address of the loopback interface where it is free, for clients that know no other port.
+    /// On port 30004, which `ur_rtde` alone reads, of an address of the loopback interface where it is free.
     #[expect(clippy::needless_pass_by_value, reason = "the server keeps it")]
-    pub fn start_on_its_own_port(script: RtdeScript) -> std::io::Result<Self> {
+    pub fn start(script: RtdeScript) -> std::io::Result<Self> {
         let mut last = None;
         for host in 2..=254 {
-            match Self::start_at((Ipv4Addr::new(127, 0, 0, host), crate::drivers::ur_rtde::PORT).into(), script.clone())
-            {
+            match Self::start_at((Ipv4Addr::new(127, 0, 0, host), wire::PORT).into(), script.clone()) {
                 Ok(robot) => return Ok(robot),
                 Err(error) => last = Some(error),
             }
@@ -208,7 +188,7 @@ impl Client {
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
                 Err(error) => return Err(error),
             }
-            while let Some((kind, body)) = unpacker.next_package().map_err(std::io::Error::other)? {
+            while let Some((kind, body)) = unpacker.next_package()? {
                 self.answer(kind, &body)?;
             }
             if Instant::now() >= next {
@@ -222,7 +202,7 @@ impl Client {
     }
 
     fn send(&mut self, kind: u8, body: &[u8]) -> std::io::Result<()> {
-        let bytes = wire::package(kind, body).map_err(std::io::Error::other)?;
+        let bytes = wire::package(kind, body)?;
         self.stream.write_all(&bytes)
     }
 
@@ -230,7 +210,7 @@ impl Client {
         let script = self.script();
         match kind {
             wire::REQUEST_PROTOCOL_VERSION => {
-                let accepted = body == [0, 2] && script.accepts_version_2 || body == [0, 1];
+                let accepted = body == [0, 2] || body == [0, 1];
                 self.send(kind, &[u8::from(accepted)])
             }
             wire::GET_CONTROLLER_VERSION => {
@@ -276,9 +256,6 @@ impl Client {
         }
         if script.silent_after.is_some_and(|most| self.sent >= most) {
             return Ok(true);
-        }
-        if let Some(garbage) = &script.garbage {
-            self.stream.write_all(garbage)?;
         }
         let time_s = 1000.0 + self.started.map_or(0.0, |start| start.elapsed().as_secs_f64());
         let mut body = vec![RECIPE];

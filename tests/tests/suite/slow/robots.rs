@@ -1,34 +1,37 @@
 //! The drivers that come with the workbench, as programs, through the driver test and through the client of the window.
 
+use std::path::Path;
 use std::time::Duration;
 
 use handeye_coppeliasim::CancelToken;
 use handeye_driver::testing::{RosScene, RosVersion, RosbridgeServer, RtdeRobot, RtdeScript};
 use handeye_driver::{DriverCell, DriverCellSpec, DriverOptions};
+use handeye_geometry::testing::python;
 use handeye_tests::handeye_binary;
 use image::RgbImage;
 use serde_json::Value;
 
 use crate::solved::handeye;
 
-fn command(arguments: &str) -> String {
-    format!("'{}' driver {arguments}", handeye_binary().display())
+/// With the Python of the tests, which has the packages of all drivers.
+fn command(python: &Path, arguments: &str) -> String {
+    format!("'{}' driver {arguments} --python '{}'", handeye_binary().display(), python.display())
 }
 
 /// Runs `handeye driver test`: every check is passed, or skipped for want of motion or of what the driver has not.
 fn assert_passes(arguments: &str) {
-    let output = handeye(&["driver", "test", &command(arguments), "--json", "-"]);
+    let Some(python) = python() else { return };
+    let output = handeye(&["driver", "test", &command(&python, arguments), "--json", "-"]);
     let report: Value = serde_json::from_slice(&output.stdout).expect("a report");
     assert_eq!((output.status.code(), &report["passed"]), (Some(0), &Value::Bool(true)), "{arguments}: {report:#}");
 }
 
 fn robot() -> RtdeRobot {
-    RtdeRobot::start(RtdeScript::default()).expect("a port of the loopback interface")
+    RtdeRobot::start(RtdeScript::default()).expect("port 30004 of some loopback address")
 }
 
 fn ur_rtde(robot: &RtdeRobot) -> String {
-    let address = robot.address();
-    format!("ur-rtde --host {} --port {} --arm ur5e", address.ip(), address.port())
+    format!("ur-rtde --host {} --arm ur5e", robot.address().ip())
 }
 
 fn ros() -> RosbridgeServer {
@@ -62,11 +65,12 @@ fn the_driver_of_a_folder_passes_the_driver_test() {
 
 #[test]
 fn a_robot_and_a_camera_of_two_drivers_make_images_with_poses() {
+    let Some(python) = python() else { return };
     let (robot, server) = (robot(), ros());
     let camera = format!("rosbridge --url {} --image /camera/image_raw", server.url());
     let spec = DriverCellSpec {
-        robot: command(&ur_rtde(&robot)).parse().expect("a command"),
-        camera: Some(command(&camera).parse().expect("a command")),
+        robot: command(&python, &ur_rtde(&robot)).parse().expect("a command"),
+        camera: Some(command(&python, &camera).parse().expect("a command")),
     };
     let cancel = CancelToken::default();
     let cell = DriverCell::start(&spec, &DriverOptions::default(), &cancel).expect("both drivers");

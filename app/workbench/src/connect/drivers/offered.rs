@@ -80,6 +80,9 @@ const fn robot_field(option: &'static str, kind: FieldKind, rank: Rank) -> Field
 use FieldKind::{Switch, Text, Word};
 use Rank::{More, Needed, Usual};
 
+/// Of every driver that is a Python file: with which Python, where it is not to have an environment of its own.
+const PYTHON: Field = field("--python", Text("/usr/bin/python3"), More);
+
 /// All of them, in the order of the list.
 pub static ALL: &[Offered] = &[
     Offered {
@@ -88,9 +91,9 @@ pub static ALL: &[Offered] = &[
         camera_alone: &[],
         fields: &[
             robot_field("--host", Text("192.168.0.10"), Needed),
-            robot_field("--port", Text("30004"), Usual),
             robot_field("--arm", Word(|| ArmKind::ALL.into_iter().map(ArmKind::name).collect()), Usual),
             robot_field("--frequency", Text("125"), More),
+            PYTHON,
         ],
     },
     Offered {
@@ -110,6 +113,7 @@ pub static ALL: &[Offered] = &[
             robot_field("--urdf", Text("robot.urdf"), More),
             field("--image-rate", Text("10"), More),
             field("--fragment-size", Text("1000000"), More),
+            PYTHON,
         ],
     },
     #[cfg(target_os = "linux")]
@@ -122,6 +126,7 @@ pub static ALL: &[Offered] = &[
             field("--size", Text("1280x720"), Usual),
             field("--format", Word(|| vec!["RGB3", "YUYV", "GREY", "MJPG"]), More),
             field("--rate", Text("30"), More),
+            PYTHON,
         ],
     },
     Offered {
@@ -143,6 +148,7 @@ pub static ALL: &[Offered] = &[
             robot_field("--joint-unit", Word(|| vec!["rad", "deg"]), More),
             field("--size", Text("1280x720"), More),
             field("--hold", Text("2"), More),
+            PYTHON,
         ],
     },
     Offered {
@@ -276,7 +282,6 @@ impl Field {
     pub fn label(&self, language: Language) -> &'static str {
         match self.option {
             "--host" | "--url" => tr!(language, "Address"),
-            "--port" => tr!(language, "Port"),
             "--arm" => tr!(language, "Arm"),
             "--frequency" => tr!(language, "States per second"),
             "--base-frame" => tr!(language, "Base frame"),
@@ -301,6 +306,7 @@ impl Field {
             "--pose" => tr!(language, "Poses are"),
             "--poses" => tr!(language, "Table of poses"),
             "--joint-unit" => tr!(language, "Joint unit"),
+            "--python" => tr!(language, "Python"),
             "--hold" => tr!(language, "Show each for [s]"),
             "--scene" => tr!(language, "Scene"),
             "--seed" => tr!(language, "Seed"),

@@ -2,21 +2,23 @@
 
 use std::io::Write as _;
 use std::path::Path;
-use std::time::Duration;
 
-use handeye_dataset::PoseFormat;
-use handeye_driver::drivers::folder::{Folder, FolderOptions};
 use handeye_driver::message::{Ability, FromDriver, ImageEncoding};
+use handeye_geometry::testing::python;
 use image::{ImageFormat, Rgb, RgbImage};
 
 use super::Talk;
 
 const HEADER: &str = "image,x,y,z,rx,ry,rz\n";
 
-fn options(folder: &Path) -> FolderOptions {
-    let keys = "poses = \"poses.csv\"\nlength_unit = \"mm\"\nrotation = \"rotation_vector\"\nangle_unit = \"deg\"\npose = \"base_from_tip\"";
-    let format = PoseFormat::parse(Path::new("options"), keys).expect("a format");
-    FolderOptions { folder: folder.into(), format: Some(format), size: Some((8, 6)), hold: Duration::ZERO }
+const SIZE: [&str; 2] = ["--size", "8x6"];
+
+/// The driver of a folder in which poses are rotation vectors in millimetres and degrees.
+fn start(python: &Path, folder: &Path, more: &[&str]) -> Talk {
+    let folder = folder.to_str().expect("a name of letters");
+    let words =
+        ["--length-unit", "mm", "--rotation", "rotation_vector", "--angle-unit", "deg", "--pose", "base_from_tip"];
+    Talk::run(python, "folder.py", &[&[folder, "--hold", "0"], words.as_slice(), more].concat())
 }
 
 /// An image that is of one grey everywhere, as a file.
@@ -53,9 +55,10 @@ fn wait_for_log(talk: &mut Talk, text: &str) {
 
 #[test]
 fn an_image_is_shown_with_its_pose_once_both_are_whole() {
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (table, file) = (folder.path().join("poses.csv"), folder.path().join("a_1.png"));
-    let mut talk = Talk::start(Folder::new(options(folder.path())));
+    let mut talk = start(&python, folder.path(), &SIZE);
     let hello = talk.hello();
     assert!(hello.can.contains(&Ability::State) && hello.can.contains(&Ability::Image));
 
@@ -78,8 +81,9 @@ fn an_image_is_shown_with_its_pose_once_both_are_whole() {
 
 #[test]
 fn images_that_come_together_are_shown_in_natural_order_each_with_its_own_pose() {
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
-    let mut talk = Talk::start(Folder::new(options(folder.path())));
+    let mut talk = start(&python, folder.path(), &SIZE);
     talk.hello();
     for number in [10, 9, 2] {
         let name = format!("view_{number}.jpg");
@@ -98,10 +102,11 @@ fn images_that_come_together_are_shown_in_natural_order_each_with_its_own_pose()
 
 #[test]
 fn a_pose_may_lie_beside_its_image() {
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("first.bmp"), image(9, ImageFormat::Bmp)).expect("written");
     std::fs::write(folder.path().join("first.txt"), "5 0 0 0 0 0").expect("written");
-    let mut talk = Talk::start(Folder::new(FolderOptions { size: None, ..options(folder.path()) }));
+    let mut talk = start(&python, folder.path(), &[]);
     assert_eq!(talk.hello().camera.map(|camera| (camera.width, camera.height)), Some((8, 6)));
     wait_for_x(&mut talk, 5.0);
     let (message, bytes) = talk.image(None, false);
@@ -114,9 +119,10 @@ fn a_pose_may_lie_beside_its_image() {
 
 #[test]
 fn what_is_missing_or_wrong_is_named_and_the_rest_goes_on() {
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let table = folder.path().join("poses.csv");
-    let mut talk = Talk::start(Folder::new(options(folder.path())));
+    let mut talk = start(&python, folder.path(), &SIZE);
     talk.hello();
     std::fs::write(folder.path().join("alone.png"), image(1, ImageFormat::Png)).expect("written");
     append(&table, HEADER);
@@ -143,9 +149,10 @@ fn what_is_missing_or_wrong_is_named_and_the_rest_goes_on() {
 
 #[test]
 fn images_alone_are_a_camera() {
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("only.png"), image(3, ImageFormat::Png)).expect("written");
-    let mut talk = Talk::start(Folder::new(FolderOptions { format: None, size: None, ..options(folder.path()) }));
+    let mut talk = Talk::run(&python, "folder.py", &[folder.path().to_str().expect("letters"), "--images-only"]);
     assert_eq!(talk.hello().can, [Ability::Image]);
     let (first, _) = talk.image(None, false);
     // As a camera that looks at what stands still: there is always a newer image.
@@ -156,9 +163,10 @@ fn images_alone_are_a_camera() {
 
 #[test]
 fn an_empty_folder_is_refused_with_what_to_do_when_the_size_of_images_is_unknown() {
+    let Some(python) = python() else { return };
     let folder = tempfile::tempdir().expect("a folder");
-    let text = Talk::start(Folder::new(FolderOptions { size: None, ..options(folder.path()) })).error();
+    let text = start(&python, folder.path(), &[]).error();
     assert!(text.contains("--size"), "{text}");
-    let text = Talk::start(Folder::new(options(&folder.path().join("nowhere")))).error();
+    let text = start(&python, &folder.path().join("nowhere"), &SIZE).error();
     assert!(text.contains("is no folder"), "{text}");
 }

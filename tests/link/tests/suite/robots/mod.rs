@@ -1,36 +1,48 @@
-//! The drivers that come with the workbench, through the protocol, in front of servers that other clients read too.
+//! The drivers that come with the workbench, through the protocol, in front of servers that are written from the makers' guides.
 
 mod folder;
 mod rosbridge;
+mod units;
 mod ur_rtde;
+mod v4l;
 
-use std::io::{BufRead as _, BufReader, PipeReader, PipeWriter, Read as _, Write as _};
-use std::path::Path;
-use std::process::Command;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use handeye_driver::drivers::{Device, Fault, serve};
 use handeye_driver::message::{FromDriver, Hello, ImageMessage, StateMessage, ToDriver};
 
 /// Long enough for a busy machine; a test that waits so long has failed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The workbench's end of a driver that runs in this process.
+/// The file of a driver that comes with the program.
+fn driver_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/drivers").join(name)
+}
+
+/// The workbench's end of a driver.
 struct Talk {
-    input: Option<PipeWriter>,
+    input: ChildStdin,
     messages: Receiver<(FromDriver, Vec<u8>)>,
-    driver: JoinHandle<Result<(), Fault>>,
+    driver: Child,
     next_id: u64,
 }
 
 impl Talk {
-    /// Starts it and says `hello`.
-    fn start(device: impl Device) -> Self {
-        let (read_by_driver, input) = std::io::pipe().expect("a pipe");
-        let (output, written_by_driver) = std::io::pipe().expect("a pipe");
-        let driver = thread::spawn(move || serve(device, read_by_driver, written_by_driver));
+    /// Runs a file of `assets/drivers` and says `hello`.
+    fn run(python: &Path, file: &str, options: &[&str]) -> Self {
+        let mut command = Command::new(python);
+        command.arg(driver_file(file)).args(options);
+        Self::with(command)
+    }
+
+    /// Starts a driver and says `hello`.
+    fn with(mut command: Command) -> Self {
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python runs");
+        let (input, output) = (child.stdin.take().expect("a pipe"), child.stdout.take().expect("a pipe"));
         let (send, messages) = channel();
         thread::spawn(move || {
             let mut output = BufReader::new(output);
@@ -40,14 +52,13 @@ impl Talk {
                 }
             }
         });
-        let mut talk = Self { input: Some(input), messages, driver, next_id: 0 };
+        let mut talk = Self { input, messages, driver: child, next_id: 0 };
         talk.say(&ToDriver::Hello { protocol: 1, workbench: "test".into() });
         talk
     }
 
     fn say(&mut self, message: &ToDriver) {
-        let input = self.input.as_mut().expect("not closed yet");
-        input.write_all(message.line().as_bytes()).expect("the driver reads");
+        self.input.write_all(message.line().as_bytes()).expect("the driver reads");
     }
 
     /// The next message that `pick` takes; others are passed over.
@@ -84,8 +95,7 @@ impl Talk {
             FromDriver::Error(error) => Some(error.text),
             _ => None,
         });
-        let result = self.driver.join().expect("no panic");
-        assert_eq!(result, Err(Fault(text.clone())));
+        assert_eq!(self.driver.wait().expect("it ends").code(), Some(1), "{text}");
         text
     }
 
@@ -103,12 +113,12 @@ impl Talk {
     /// Ends it as the workbench does.
     fn bye(mut self) {
         self.say(&ToDriver::Bye {});
-        assert_eq!(self.driver.join().expect("no panic"), Ok(()));
+        assert_eq!(self.driver.wait().expect("it ends").code(), Some(0));
     }
 }
 
 /// One message and the bytes behind it; `None` at the end.
-fn read(output: &mut BufReader<PipeReader>) -> Option<(FromDriver, Vec<u8>)> {
+fn read(output: &mut BufReader<ChildStdout>) -> Option<(FromDriver, Vec<u8>)> {
     let mut line = String::new();
     if output.read_line(&mut line).expect("lines of text") == 0 {
         return None;
@@ -117,14 +127,4 @@ fn read(output: &mut BufReader<PipeReader>) -> Option<(FromDriver, Vec<u8>)> {
     let mut bytes = vec![0; usize::try_from(count).expect("a length")];
     output.read_exact(&mut bytes).expect("the bytes of the message");
     Some((message, bytes))
-}
-
-/// What a script of `tests/python` prints: JSON.
-fn script(python: &Path, name: &str, arguments: &[&str]) -> serde_json::Value {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/python").join(name);
-    let output = Command::new(python).arg(file).args(arguments).output().expect("python runs");
-    let text = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{name}:\n{text}{}", String::from_utf8_lossy(&output.stderr));
-    let line = text.lines().last().expect("a line");
-    serde_json::from_str(line).unwrap_or_else(|error| panic!("{name}: {error}: {line}"))
 }

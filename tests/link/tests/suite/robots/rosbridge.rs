@@ -1,89 +1,80 @@
-//! `handeye driver rosbridge` in front of a rosbridge that PyPI's `roslibpy` reads too.
+//! `handeye driver rosbridge` in front of a rosbridge that is written from its protocol's specification.
 
+use std::path::Path;
 use std::time::Duration;
 
-use handeye_arm::JointKind;
-use handeye_driver::drivers::rosbridge::{Rosbridge, RosbridgeOptions};
-use handeye_driver::message::{Ability, FromDriver, ImageEncoding, JointMessage};
+use handeye_driver::message::{Ability, FromDriver, ImageEncoding};
 use handeye_driver::testing::{RosScene, RosVersion, RosbridgeServer, Topic};
 use handeye_geometry::camera::Distortion;
 use handeye_geometry::testing::python;
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 use serde_json::json;
 
-use super::{Talk, script};
+use super::Talk;
 
-fn server(version: RosVersion) -> RosbridgeServer {
-    RosbridgeServer::start(RosScene::new(version).topics()).expect("a port of the loopback interface")
+const FRAMES: [&str; 4] = ["--base-frame", "base_link", "--tip-frame", "tool0"];
+const JOINTS: [&str; 4] = ["--joints", "/joint_states", "--joint-names", "shoulder_pan_joint,elbow_joint"];
+const IMAGE: [&str; 2] = ["--image", "/camera/image_raw"];
+const CAMERA_INFO: [&str; 2] = ["--camera-info", "/camera/camera_info"];
+const DEPTH: [&str; 2] = ["--depth", "/camera/depth"];
+
+fn server(scene: RosScene) -> RosbridgeServer {
+    RosbridgeServer::start(scene.topics()).expect("a port of the loopback interface")
 }
 
-fn options(server: &RosbridgeServer) -> RosbridgeOptions {
-    let joint = |name: &str| JointMessage { name: name.into(), kind: JointKind::Revolute, min: None, max: None };
-    RosbridgeOptions {
-        base_frame: Some("base_link".into()),
-        tip_frame: Some("tool0".into()),
-        joints: Some("/joint_states".into()),
-        arm_joints: vec![joint("shoulder_pan_joint"), joint("elbow_joint")],
-        image: Some("/camera/image_raw".into()),
-        camera_info: Some("/camera/camera_info".into()),
-        depth: Some("/camera/depth".into()),
-        ..RosbridgeOptions::new(server.url())
-    }
+fn start(python: &Path, server: &RosbridgeServer, options: &[&[&str]]) -> Talk {
+    Talk::run(python, "rosbridge.py", &[&["--url", &server.url()], options.concat().as_slice()].concat())
 }
 
-/// The driver and `roslibpy` at one server read the same pose, joints, pixels, depth and lens.
-fn both_clients_read_the_same(version: RosVersion, name: &str, fragment_size: Option<u32>) {
+/// Pose, joints, pixels, depth and lens are those of the robot.
+fn the_robot_is_read(scene: RosScene, more: &[&str]) {
     let Some(python) = python() else { return };
-    let server = server(version);
-    let theirs = script(&python, "read_rosbridge.py", &[&server.port().to_string(), name, "base_link", "tool0"]);
-    let mut talk = Talk::start(Rosbridge::new(RosbridgeOptions { fragment_size, ..options(&server) }));
+    let server = server(scene);
+    let mut talk = start(&python, &server, &[&FRAMES, &JOINTS, &IMAGE, &CAMERA_INFO, &DEPTH, more]);
     let hello = talk.hello();
     assert_eq!(hello.can, [Ability::State, Ability::Joints, Ability::Image, Ability::Depth]);
 
     let state = talk.state();
-    let numbers = |key: &str| -> Vec<f64> { serde_json::from_value(theirs[key].clone()).expect("numbers") };
     let pose = state.base_from_tip.expect("a pose");
-    let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(off(&pose.translation_m, &numbers("translation")) < 1e-12, "{pose:?} {theirs:#}");
-    assert!(off(&pose.rotation_xyzw, &numbers("rotation")) < 1e-12, "{pose:?} {theirs:#}");
-    let joints = state.joints_rad.expect("joints");
-    assert_eq!(json!(joints), json!([theirs["joints"]["shoulder_pan_joint"], theirs["joints"]["elbow_joint"]]));
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::from(pose.rotation_xyzw));
+    let pose = Isometry3::from_parts(pose.translation_m.into(), rotation);
+    let off = (pose.to_homogeneous() - scene.base_from_tip().to_homogeneous()).amax();
+    assert!(off < 1e-12, "{pose} {}", scene.base_from_tip());
+    assert_eq!(&state.joints_rad.expect("joints")[..], [0.5, -1.25]);
 
     let (image, pixels) = talk.image(None, true);
-    assert_eq!((image.width, image.height, image.encoding), (16, 12, ImageEncoding::Rgb8));
-    assert_eq!(theirs["image"], hex(&pixels));
+    assert_eq!((image.width, image.height, image.encoding), (scene.width, scene.height, ImageEncoding::Rgb8));
+    assert_eq!(pixels, scene.pixels());
     let (depth, bytes) = talk.wait(|message, bytes| match message {
         FromDriver::Depth(depth) => Some((depth, bytes)),
         _ => None,
     });
     assert!((depth.stamp - image.stamp).abs() < 0.005);
-    assert_eq!(theirs["depth"], hex(&bytes));
+    assert_eq!(bytes, scene.depths());
 
     let lens = hello.camera.expect("a camera").intrinsics.expect("a lens");
-    let k = numbers("k");
-    assert_eq!([lens.fx, lens.cx, lens.fy, lens.cy], [k[0], k[2], k[4], k[5]]);
-    assert_eq!(lens.distortion.coefficients(), numbers("d"));
-    assert!(matches!(lens.distortion, Distortion::BrownConrady(_)));
+    assert_eq!([lens.fx, lens.cx, lens.fy, lens.cy], [15.5, 7.25, 15.75, 5.5]);
+    assert_eq!(lens.distortion, Distortion::BrownConrady([0.11, -0.21, 0.001, -0.002, 0.03]));
     talk.bye();
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+#[test]
+fn ros_1_is_read() {
+    the_robot_is_read(RosScene::new(RosVersion::One), &[]);
 }
 
 #[test]
-fn ros_1_is_read_as_another_client_reads_it() {
-    both_clients_read_the_same(RosVersion::One, "1", None);
-}
-
-#[test]
-fn ros_2_is_read_as_another_client_reads_it_in_pieces_too() {
-    both_clients_read_the_same(RosVersion::Two, "2", Some(200));
+fn ros_2_is_read_in_pieces_too() {
+    // Its messages are longer than a piece.
+    let scene = RosScene { width: 64, height: 48, ..RosScene::new(RosVersion::Two) };
+    the_robot_is_read(scene, &["--fragment-size", "1000"]);
 }
 
 #[test]
 fn states_and_images_go_on_with_stamps_that_rise() {
-    let server = server(RosVersion::Two);
-    let mut talk = Talk::start(Rosbridge::new(options(&server)));
+    let Some(python) = python() else { return };
+    let server = server(RosScene::new(RosVersion::Two));
+    let mut talk = start(&python, &server, &[&FRAMES, &JOINTS, &IMAGE]);
     talk.hello();
     let first = talk.state();
     let second = talk.state();
@@ -96,33 +87,28 @@ fn states_and_images_go_on_with_stamps_that_rise() {
 
 #[test]
 fn without_frames_the_tree_is_shown_and_they_are_asked_for() {
-    let server = server(RosVersion::Two);
-    let text = Talk::start(Rosbridge::new(RosbridgeOptions::new(server.url()))).error();
+    let Some(python) = python() else { return };
+    let server = server(RosScene::new(RosVersion::Two));
+    let text = start(&python, &server, &[]).error();
     assert!(text.contains("--base-frame and --tip-frame"), "{text}");
     assert!(text.contains("world\n  base_link\n    link_1\n      tool0"), "{text}");
 }
 
 #[test]
 fn what_is_missing_is_named_with_the_topics_and_frames_that_there_are() {
-    type Change = fn(&mut RosbridgeOptions);
-    let cases: [(Change, &[&str]); 3] = [
-        (|options| options.tip_frame = Some("flange".into()), &["no frame \"flange\"", "link_1"]),
+    let cases: [(&[&[&str]], &[&str]); 3] = [
+        (&[&["--base-frame", "base_link", "--tip-frame", "flange"]], &["no frame \"flange\"", "link_1"]),
         (
-            |options| options.image = Some("/camera/image".into()),
+            &[&FRAMES, &["--image", "/camera/image"]],
             &["nothing comes on /camera/image", "/camera/image_raw (sensor_msgs/msg/Image)", "not yet advertised"],
         ),
-        (|options| options.arm_joints.clear(), &["elbow_joint,shoulder_pan_joint", "--joint-names"]),
+        (&[&FRAMES, &JOINTS[..2]], &["elbow_joint,shoulder_pan_joint", "--joint-names"]),
     ];
     // Each waits some seconds, so together.
-    let server = server(RosVersion::Two);
-    let running: Vec<_> = cases
-        .iter()
-        .map(|(change, expected)| {
-            let mut options = options(&server);
-            change(&mut options);
-            (Talk::start(Rosbridge::new(options)), expected)
-        })
-        .collect();
+    let Some(python) = python() else { return };
+    let server = server(RosScene::new(RosVersion::Two));
+    let running: Vec<_> =
+        cases.iter().map(|(options, expected)| (start(&python, &server, options), expected)).collect();
     for (talk, expected) in running {
         let text = talk.error();
         for part in *expected {
@@ -133,10 +119,9 @@ fn what_is_missing_is_named_with_the_topics_and_frames_that_there_are() {
 
 #[test]
 fn a_camera_without_a_robot_is_a_driver() {
-    let server = server(RosVersion::One);
-    let mut options = RosbridgeOptions::new(server.url());
-    options.image = Some("/camera/image_raw".into());
-    let mut talk = Talk::start(Rosbridge::new(options));
+    let Some(python) = python() else { return };
+    let server = server(RosScene::new(RosVersion::One));
+    let mut talk = start(&python, &server, &[&IMAGE]);
     assert_eq!(talk.hello().can, [Ability::Image]);
     let (_, pixels) = talk.image(None, false);
     assert_eq!(pixels, RosScene::new(RosVersion::One).pixels());
@@ -145,10 +130,11 @@ fn a_camera_without_a_robot_is_a_driver() {
 
 #[test]
 fn topics_that_come_later_are_waited_for() {
-    let server = server(RosVersion::Two);
+    let Some(python) = python() else { return };
+    let server = server(RosScene::new(RosVersion::Two));
     let topics = RosScene::new(RosVersion::Two).topics();
     server.remove("/camera/image_raw");
-    let mut talk = Talk::start(Rosbridge::new(options(&server)));
+    let mut talk = start(&python, &server, &[&FRAMES, &JOINTS, &IMAGE]);
     server.set("/camera/image_raw", topics["/camera/image_raw"].clone());
     talk.hello();
     talk.bye();
@@ -158,10 +144,9 @@ fn topics_that_come_later_are_waited_for() {
 fn images_that_change_their_size_or_have_no_stamp_end_the_driver_with_the_reason() {
     let small = RosScene::new(RosVersion::Two);
     let large = RosScene { width: 32, ..small };
-    let server = server(RosVersion::Two);
-    let mut options = RosbridgeOptions::new(server.url());
-    options.image = Some("/camera/image_raw".into());
-    let mut talk = Talk::start(Rosbridge::new(options.clone()));
+    let Some(python) = python() else { return };
+    let server = server(RosScene::new(RosVersion::Two));
+    let mut talk = start(&python, &server, &[&IMAGE]);
     talk.hello();
     server.set("/camera/image_raw", large.topics()["/camera/image_raw"].clone());
     let text = talk.error();
@@ -172,17 +157,18 @@ fn images_that_change_their_size_or_have_no_stamp_end_the_driver_with_the_reason
         move |_| json!({"header": small.header(0.0, "camera"), "height": 1, "width": 1, "encoding": "mono8", "step": 1, "data": "AA=="}),
     );
     server.set("/camera/image_raw", unstamped);
-    let text = Talk::start(Rosbridge::new(options)).error();
+    let text = start(&python, &server, &[&IMAGE]).error();
     assert!(text.contains("no stamp"), "{text}");
 }
 
 #[test]
-fn an_address_where_there_is_no_rosbridge_is_said_with_how_to_start_it() {
-    let url = server(RosVersion::Two).url();
-    let text = Talk::start(Rosbridge::new(RosbridgeOptions::new(url.clone()))).error();
+fn an_address_where_there_is_no_rosbridge_is_named_with_how_to_start_it() {
+    let Some(python) = python() else { return };
+    let url = server(RosScene::new(RosVersion::Two)).url();
+    let text = Talk::run(&python, "rosbridge.py", &["--url", &url]).error();
     assert!(text.contains(&url) && text.contains("rosbridge_websocket_launch.xml"), "{text}");
-    for (url, expected) in [("http://127.0.0.1:1", "does not begin with ws://"), ("wss://robot:9090", "encrypted")] {
-        let text = Talk::start(Rosbridge::new(RosbridgeOptions::new(url))).error();
-        assert!(text.contains(expected), "{text}");
-    }
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").expect("a port of the loopback interface");
+    let url = format!("ws://{}", silent.local_addr().expect("an address"));
+    let text = Talk::run(&python, "rosbridge.py", &["--url", &url]).error();
+    assert!(text.contains(&url) && text.contains("does not answer as a rosbridge"), "{text}");
 }
