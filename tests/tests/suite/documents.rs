@@ -11,8 +11,6 @@ const TOP: [&str; 9] = [".ci", ".github", "app", "assets", "core", "docs", "scri
 const SOURCES: [&str; 3] = ["rs", "py", "js"];
 /// Names of what existed when a line was written.
 const HISTORY: &str = "CHANGELOG.md";
-/// Pages that still name others as they were called before `docs/reference`; their links are looked for there.
-const BEFORE_THE_MOVE: &str = "docs/drivers";
 /// Words of all pages but the studies, which are measured tables.
 const MOST_WORDS: usize = 45_000;
 /// Words of README.md.
@@ -139,10 +137,7 @@ fn every_link_path_and_example_that_a_page_names_is_there() {
         let folder = Path::new(page).parent().expect("a folder");
         for link in links(&prose).into_iter().filter(|link| !link.contains("://") && !link.starts_with("mailto:")) {
             let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
-            let mut to = if path.is_empty() { page.clone() } else { plain(&folder.join(path)) };
-            if page.starts_with(BEFORE_THE_MOVE) && !root().join(&to).exists() {
-                to = to.replace("docs/", "docs/reference/");
-            }
+            let to = if path.is_empty() { page.clone() } else { plain(&folder.join(path)) };
             if !root().join(&to).exists() {
                 wrong.push(format!("{page}: no {link}"));
             } else if !anchor.is_empty() && !anchors(&read(&to)).contains(anchor) {
