@@ -3,7 +3,7 @@
 use std::collections::hash_map::DefaultHasher;
 use std::fs::File;
 use std::hash::{Hash as _, Hasher as _};
-use std::io::{BufRead as _, BufReader, IsTerminal as _, Read, Write as _};
+use std::io::{BufRead as _, BufReader, Read, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc;
@@ -83,8 +83,17 @@ pub enum EnvironmentError {
     },
 }
 
+/// Who waits for an environment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Audience {
+    /// A person, who reads standard error.
+    Person,
+    /// A workbench that awaits `hello` on standard output.
+    Workbench,
+}
+
 /// The Python of a driver's environment, which is made where there is none yet.
-pub fn python_of(driver: &Shipped) -> Result<Command, EnvironmentError> {
+pub fn python_of(driver: &Shipped, audience: Audience) -> Result<Command, EnvironmentError> {
     // A test sees that every driver states its needs.
     let needs =
         Needs::of(driver.source).unwrap_or_else(|| Needs { requires_python: ">=3".into(), dependencies: Vec::new() });
@@ -95,7 +104,7 @@ pub fn python_of(driver: &Shipped) -> Result<Command, EnvironmentError> {
     }
     let cache = files::cache()?;
     let folder = cache.join(format!("{}-{:016x}", driver.name, key(&needs, &base)));
-    ensure(&folder, driver.name, &needs)?;
+    ensure(&folder, driver.name, &needs, audience)?;
     let mut command = Command::new(folder.join("bin").join("python"));
     // Those of a shell that is set up for ROS would come before the environment's own.
     command.env_remove("PYTHONPATH").env_remove("PYTHONHOME");
@@ -137,7 +146,7 @@ fn key(needs: &Needs, base: &Base) -> u64 {
 
 /// Makes an environment, unless it is there. One program makes it, others wait for that one; what was begun and not completed
 /// is made again.
-fn ensure(folder: &Path, name: &str, needs: &Needs) -> Result<(), EnvironmentError> {
+fn ensure(folder: &Path, name: &str, needs: &Needs, audience: Audience) -> Result<(), EnvironmentError> {
     let is_complete = || folder.join(COMPLETE).is_file() && folder.join("bin").join("python").is_file();
     if is_complete() {
         return Ok(());
@@ -149,15 +158,15 @@ fn ensure(folder: &Path, name: &str, needs: &Needs) -> Result<(), EnvironmentErr
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     let lock = folder.with_extension("lock");
     let file = File::create(&lock).map_err(failed(&lock))?;
-    let _locked = waited_for(move || file.lock().map(|()| file)).map_err(failed(&lock))?;
+    let _locked = waited_for(audience, move || file.lock().map(|()| file)).map_err(failed(&lock))?;
     if is_complete() {
         return Ok(());
     }
-    make(folder, name, needs)?;
+    make(folder, name, needs, audience)?;
     std::fs::write(folder.join(COMPLETE), needs.dependencies.join("\n")).map_err(failed(folder))
 }
 
-fn make(folder: &Path, name: &str, needs: &Needs) -> Result<(), EnvironmentError> {
+fn make(folder: &Path, name: &str, needs: &Needs, audience: Audience) -> Result<(), EnvironmentError> {
     let packages = needs.dependencies.join(" ");
     out::note(format_args!(
         "making a Python environment for the driver {name} in {}, once; it downloads {packages} and what that needs",
@@ -165,21 +174,21 @@ fn make(folder: &Path, name: &str, needs: &Needs) -> Result<(), EnvironmentError
     ));
     let mut venv = Command::new(PYTHON);
     venv.args(["-m", "venv", "--clear"]).arg(folder);
-    run(&mut venv).map_err(|why| EnvironmentError::NoVenv { why, packages: packages.clone() })?;
+    run(&mut venv, audience).map_err(|why| EnvironmentError::NoVenv { why, packages: packages.clone() })?;
     let mut pip = Command::new(folder.join("bin").join("python"));
     pip.args(["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"]);
     pip.args(&needs.dependencies).env_remove("PYTHONPATH").env_remove("PYTHONHOME");
-    run(&mut pip).map_err(|why| EnvironmentError::NoPackages { packages, why })?;
+    run(&mut pip, audience).map_err(|why| EnvironmentError::NoPackages { packages, why })?;
     out::note("the environment is made");
     Ok(())
 }
 
 /// Runs a program to its end, printing what it prints to standard error. Its last line where it fails, or how it ended.
-fn run(command: &mut Command) -> Result<(), String> {
+fn run(command: &mut Command, audience: Audience) -> Result<(), String> {
     let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = started.map_err(|error| error.to_string())?;
     let outputs = [child.stdout.take().map(boxed), child.stderr.take().map(boxed)];
-    waited_for(move || {
+    waited_for(audience, move || {
         let readers = outputs.into_iter().flatten().map(|output| thread::spawn(move || printed(output)));
         let readers: Vec<_> = readers.collect();
         let last = readers.into_iter().rev().find_map(|reader| reader.join().ok().flatten());
@@ -199,9 +208,8 @@ fn printed(output: Box<dyn Read + Send>) -> Option<String> {
     lines.inspect(|line| out::note(format_args!("  {line}"))).last()
 }
 
-/// Does what takes long in a thread of its own, and says meanwhile on standard output, if a workbench reads it, that the driver
-/// is being prepared.
-fn waited_for<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+/// Does what takes long in a thread of its own, and sends a workbench meanwhile that the driver is being prepared.
+fn waited_for<T: Send + 'static>(audience: Audience, work: impl FnOnce() -> T + Send + 'static) -> T {
     let (send, done) = mpsc::channel();
     let worker = thread::spawn(move || {
         let result = work();
@@ -211,7 +219,7 @@ fn waited_for<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T
     });
     let mut output = std::io::stdout();
     while let Err(mpsc::RecvTimeoutError::Timeout) = done.recv_timeout(STILL_AT_IT) {
-        if !output.is_terminal() {
+        if audience == Audience::Workbench {
             let line = json!({"type": "preparing", "text": "a Python environment is being made, once"});
             // Where nobody reads it, the driver finds out.
             let _written = writeln!(output, "{line}").and_then(|()| output.flush()).is_ok();

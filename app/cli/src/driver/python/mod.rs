@@ -6,6 +6,7 @@ mod files;
 mod script;
 
 use std::ffi::{OsStr, OsString};
+use std::io::IsTerminal as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
 use std::process::Command;
@@ -14,6 +15,8 @@ use clap::Args;
 
 use crate::Failure;
 use handeye_workbench::arguments::heading;
+
+use environment::Audience;
 
 pub use eject::{EjectArgs, eject};
 #[cfg(test)]
@@ -45,7 +48,7 @@ pub fn run(driver: &Shipped, args: &PythonArgs) -> Result<(), Failure> {
         Some(python) => Command::new(python),
         // Help needs no packages.
         None if asks_for_help => Command::new(environment::PYTHON),
-        None => environment::python_of(driver).map_err(Failure::failed)?,
+        None => environment::python_of(driver, audience()).map_err(Failure::failed)?,
     };
     let program = command.get_program().to_owned();
     let error = command
@@ -54,6 +57,11 @@ pub fn run(driver: &Shipped, args: &PythonArgs) -> Result<(), Failure> {
         .env(NAME_VARIABLE, format!("handeye driver {}", driver.name))
         .exec();
     Err(Failure::failed(environment::EnvironmentError::NoPython { python: program.into(), why: error.to_string() }))
+}
+
+/// A workbench, unless a person has started the driver in a terminal.
+fn audience() -> Audience {
+    if std::io::stdout().is_terminal() { Audience::Person } else { Audience::Workbench }
 }
 
 /// Makes the environment of one of these drivers, where a command line starts one that has none yet.
@@ -65,7 +73,7 @@ pub fn prepare(words: &[String]) -> Result<(), Failure> {
     if options.iter().any(|option| option.starts_with(PYTHON_OPTION)) {
         return Ok(());
     }
-    environment::python_of(driver).map(drop).map_err(Failure::failed)
+    environment::python_of(driver, Audience::Person).map(drop).map_err(Failure::failed)
 }
 
 /// Takes `--python` out of the options, wherever it is.
