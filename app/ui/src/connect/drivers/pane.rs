@@ -264,15 +264,14 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_is_connected_to_by_its_address_port_and_arm_without_a_command_line() {
+    fn a_controller_is_connected_to_by_its_address_and_arm_without_a_command_line() {
         let mut pane = Driven::new(connect_ui, sample::connected());
         pane.click("Driver");
         assert!(!pane.is_enabled("Connect now"), "the address is missing");
         pane.type_into("Robot: Address", "192.168.0.7");
-        pane.type_into("Robot: Port", "30014");
         choose(&mut pane, "Robot: Arm", "ur5e");
         assert!(pane.nothing_is_cut_off());
-        let robot = "handeye driver ur-rtde --host 192.168.0.7 --port 30014 --arm ur5e";
+        let robot = "handeye driver ur-rtde --host 192.168.0.7 --arm ur5e";
         assert!(pane.sees(robot));
         assert_eq!(pane.click("Connect now"), [Command::Connect(drivers(Some(robot), None))]);
     }
