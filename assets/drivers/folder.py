@@ -2,9 +2,10 @@
 # requires-python = ">=3.9"
 # dependencies = ["pillow>=10,<14", "tomli>=2,<3; python_version < '3.11'"]
 # ///
-"""A driver of Handeye Workbench that shows each image which comes into a folder, with its pose (docs/drivers/folder.md).
+r"""A driver of Handeye Workbench that shows each image which comes into a folder, with its pose (docs/drivers/folder.md).
 
-    handeye driver folder captures --length-unit mm --rotation rpy --angle-unit deg --pose base_from_tip
+    handeye driver folder captures --length-unit mm --rotation rpy \
+        --angle-unit deg --pose base_from_tip
 
 The folder is looked at four times a second rather than watched: that works on every file system, network shares too.
 """
@@ -520,17 +521,17 @@ def main():
     options = parser(__doc__)
     options.add_argument("folder", metavar="DIR", help="the folder")
     options.add_argument("--images-only", action="store_true", help="there are no poses, only images")
-    options.add_argument("--size", type=size, help="size of the images, such as 1280x720, needed while there is none yet")
+    options.add_argument("--size", metavar="WIDTHxHEIGHT", type=size, help="size of the images, such as 1280x720, needed while there is none yet")
     options.add_argument(
-        "--hold", type=within(0, 3600), default=2.0, help="how long each capture is shown at least before the next, in seconds"
+        "--hold", metavar="SECONDS", type=within(0, 3600), default=2.0, help="how long each capture is shown at least before the next, in seconds"
     )
-    robot = options.add_argument_group("how poses are written: the keys of [robot] in a dataset.toml, which are taken from there else")
-    robot.add_argument("--poses", help="table of poses in the folder; poses.csv if not given")
+    robot = options.add_argument_group("how poses are written", "the keys of [robot] in a dataset.toml, taken from there if none is given")
+    robot.add_argument("--poses", metavar="FILE", help="table of poses in the folder; poses.csv if not given")
     robot.add_argument("--length-unit", choices=LENGTHS, help="unit of positions")
-    robot.add_argument("--rotation", choices=ROTATIONS, help="how rotations are written")
+    robot.add_argument("--rotation", metavar="WORD", choices=ROTATIONS, help=f"how rotations are written: {', '.join(ROTATIONS)}")
     robot.add_argument("--angle-unit", choices=ANGLES, help="unit of rotation_vector and rpy")
-    robot.add_argument("--pose", choices=DIRECTIONS, help="what a pose states")
-    robot.add_argument("--joints", type=int, help="how many joint angles follow the rotation")
+    robot.add_argument("--pose", metavar="WORD", choices=DIRECTIONS, help=f"what a pose states: {' or '.join(DIRECTIONS)}")
+    robot.add_argument("--joints", metavar="N", type=int, help="how many joint angles follow the rotation")
     robot.add_argument("--joint-unit", choices=ANGLES, help="unit of joint angles")
     chosen = options.parse_args()
     try:

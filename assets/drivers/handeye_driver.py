@@ -14,7 +14,9 @@ import collections
 import json
 import math
 import os
+import shutil
 import sys
+import textwrap
 import threading
 import time
 import traceback
@@ -232,14 +234,24 @@ def serve(device):
 
 
 def parser(documentation):
-    """Options of a driver, under the name that it was started with."""
+    """Options of a driver, under the name that it was started with. Of its documentation, what is indented are examples."""
+    width = min(shutil.get_terminal_size().columns, 100) - 2
+    paragraphs = documentation.strip("\n").split("\n\n")
+    examples = [textwrap.indent(textwrap.dedent(part), "  ") for part in paragraphs if part.startswith("    ")]
+    words = [textwrap.fill(part, width) for part in paragraphs if not part.startswith("    ")]
     name = os.environ.get("HANDEYE_DRIVER")  # where the workbench's program starts it
-    form = argparse.RawDescriptionHelpFormatter
-    options = argparse.ArgumentParser(prog=name, description=documentation, formatter_class=form, allow_abbrev=False)
+    options = argparse.ArgumentParser(
+        prog=name,
+        description="\n\n".join(words),
+        epilog="\n".join(["Examples:", *examples]),
+        formatter_class=lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=width),
+        allow_abbrev=False,
+    )
     if name:
-        # That program takes it out of the options.
+        # That program takes them out of the options.
         help = "the Python to run this with, which has its packages, in place of an environment that is made once"
         options.add_argument("--python", metavar="PATH", help=help)
+        options.add_argument("-q", "--quiet", action="store_true", help="say nothing but results and errors")
     return options
 
 

@@ -2,12 +2,13 @@
 # requires-python = ">=3.9"
 # dependencies = ["roslibpy>=2.1,<2.2", "pillow>=10,<14"]
 # ///
-"""A driver of Handeye Workbench that reads a robot and a camera of ROS 1 or ROS 2 through rosbridge (docs/drivers/rosbridge.md).
+r"""A driver of Handeye Workbench that reads a robot and a camera of ROS 1 or ROS 2 through rosbridge (docs/drivers/rosbridge.md).
 
-    handeye driver test "handeye driver rosbridge --url ws://192.168.0.7:9090"      # lists the frames of tf
-    handeye driver rosbridge --url ws://192.168.0.7:9090 --base-frame base_link --tip-frame tool0 --image /camera/image_raw
+It only reads: it subscribes to topics and publishes none. Without frames and images it lists the frames of tf.
 
-It only reads: it subscribes to topics and publishes none.
+    handeye driver test "handeye driver rosbridge --url ws://192.168.0.7:9090"
+    handeye driver rosbridge --url ws://192.168.0.7:9090 \
+        --base-frame base_link --tip-frame tool0 --image /camera/image_raw
 """
 
 import array

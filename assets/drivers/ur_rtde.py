@@ -141,12 +141,13 @@ def log_modes(outlet, robot_mode, safety_mode):
 
 def main():
     options = parser(__doc__)
-    options.add_argument("--host", required=True, help="address of the controller, as the pendant shows it")
+    options.add_argument("--host", required=True, metavar="ADDR", help="address of the controller, as the pendant shows it")
     options.add_argument("--port", type=int, choices=[PORT], default=PORT, help="of RTDE; the library knows no other")
     options.add_argument(
-        "--frequency", type=within(10, 500, int), default=125, help="states a second: up to 125 from a CB3, up to 500 from an e-Series"
+        "--frequency", metavar="HZ", type=within(10, 500, int), default=125, help="states a second: up to 125 from a CB3, up to 500 from an e-Series"
     )
-    options.add_argument("--arm", choices=ARMS, help="which arm it is: the controller does not say; leave it out for another one")
+    arms = f"which arm it is, which the controller does not say: {', '.join(ARMS)}"
+    options.add_argument("--arm", metavar="NAME", choices=ARMS, help=arms)
     serve(UrRtde(options.parse_args()))
 
 
