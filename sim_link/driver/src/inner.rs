@@ -102,7 +102,7 @@ pub struct Inner {
     pub arm: Option<Arc<Arm>>,
     /// What its states say of it.
     pub chain: ChainWatch,
-    /// How often it has said that it is being prepared.
+    /// How many `preparing` have come.
     pub preparations: u64,
     /// Why it is over.
     pub ending: Option<Ending>,

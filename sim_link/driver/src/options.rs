@@ -12,7 +12,7 @@ use super::clock::Timebase;
 pub struct DriverOptions {
     /// Longest wait for the driver's `hello`: a camera takes its time to open.
     pub hello: Duration,
-    /// Longest preparation: as long as the driver says `preparing`, [`Self::hello`] begins again.
+    /// Longest preparation: with each `preparing` the wait for `hello` begins again.
     pub preparation: Duration,
     /// How often a ping is sent.
     pub ping_every: Duration,
@@ -32,12 +32,12 @@ pub struct DriverOptions {
     pub preparing: Preparing,
 }
 
-/// What a driver that is being prepared says, for whoever waits for its start. Clones are the same.
+/// The text of the newest `preparing`, for whoever waits for the start. Clones are the same.
 #[derive(Debug, Clone, Default)]
 pub struct Preparing(Arc<Mutex<Option<String>>>);
 
 impl Preparing {
-    /// What it said last, for people.
+    /// The newest, for people.
     pub fn text(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
