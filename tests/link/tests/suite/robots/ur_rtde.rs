@@ -139,6 +139,12 @@ fn an_arm_that_is_switched_off_has_no_pose_until_it_is_switched_on() {
         FromDriver::State(state) => panic!("{state:?}"),
         _ => None,
     });
+    talk.say(&ToDriver::Ping { id: 1 });
+    talk.wait(|message, _| match message {
+        FromDriver::Pong(_) => Some(()),
+        FromDriver::State(state) => panic!("{state:?}"),
+        _ => None,
+    });
     robot.set("robot_mode", Output::Int(7));
     talk.state();
     talk.bye();
