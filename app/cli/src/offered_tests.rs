@@ -78,7 +78,7 @@ fn filled(offered: &Offered, part: Part) -> Values {
 fn is_taken_by_its_file(name: &str, options: &[String]) {
     let Some(shipped) = python::ALL.iter().find(|shipped| shipped.name == name) else { return };
     let Some(python) = handeye_geometry::testing::python() else { return };
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/drivers").join(shipped.file);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/drivers").join(shipped.file);
     let mut command = std::process::Command::new(python);
     // Help is what it prints once all before it is understood; its name is what has it take `--python` as well.
     let output = command.arg(file).args(options).arg("--help").env(python::NAME_VARIABLE, name).output();

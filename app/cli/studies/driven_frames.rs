@@ -37,7 +37,7 @@ const CAPTURES: usize = 10;
 const VERIFIED: usize = 2;
 
 fn reference_poses() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../assets/poses/seed10.toml")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/poses/seed10.toml")
 }
 
 fn main() -> anyhow::Result<()> {

@@ -56,7 +56,7 @@ fn literal(source: &str) -> Option<String> {
 
 fn all_sources() -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
-    for folder in ["src", "../core", "../sim_link"] {
+    for folder in ["..", "../../core", "../../sim_link"] {
         sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
     }
     files.retain(|file| file.components().any(|part| part.as_os_str() == "src"));
@@ -108,7 +108,7 @@ fn phrases() -> BTreeSet<String> {
 }
 
 fn own_sources() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
 #[test]

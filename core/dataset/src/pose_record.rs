@@ -55,7 +55,6 @@ pub mod optional {
     ///
     /// # Errors
     /// Those of the serializer.
-    #[expect(clippy::ref_option, reason = "serde passes a reference to the field")]
     pub fn serialize<Dst, Src, S: Serializer>(pose: &Option<Pose<Dst, Src>>, serializer: S) -> Result<S::Ok, S::Error> {
         pose.as_ref().map(Record::of).serialize(serializer)
     }

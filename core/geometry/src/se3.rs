@@ -137,7 +137,7 @@ pub const ORTHONORMAL_TOLERANCE: f64 = 2e-3;
 pub enum NotARotation {
     /// Its columns have other lengths or angles.
     #[error(
-        "its columns are not orthonormal (RᵀR is {deviation:.6} from the identity, at most {ORTHONORMAL_TOLERANCE})"
+        "its columns are not orthonormal: the largest error of their products is {deviation:.6}, at most {ORTHONORMAL_TOLERANCE}"
     )]
     NotOrthonormal {
         /// Largest element of the difference.

@@ -3,8 +3,14 @@
 use nalgebra::{Matrix6, Vector6};
 use serde_json::json;
 
-use super::*;
-use handeye_geometry::frames::{Base, Target, Tip};
+use super::{
+    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate,
+    MethodRecord, PrintEstimate, Quality, ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate,
+    TruthComparison, VerificationSummary, ViewRecord, ViewRecordStatus, WideningRecord,
+};
+use handeye_estimate::handeye::HandEye;
+use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 
 /// Calibration that the exports of other programs are compared with: tip to camera, 1280×720, `plumb_bob`.
 pub const GOLDEN_TRANSLATION_M: [f64; 3] = [0.045, -0.032, 0.061];
@@ -122,7 +128,7 @@ pub fn golden() -> CalibrationResult {
         as_stated: Some(true),
     });
     result.truth = Some(TruthComparison { translation_error_mm: Some(0.2), ..TruthComparison::default() });
-    result.provenance.tool_version = "0.1.0".to_owned();
+    "0.1.0".clone_into(&mut result.provenance.tool_version);
     result.provenance.input_sha256 = Some("00ff".repeat(16));
     result.provenance.options.insert("robust".to_owned(), json!(true));
     result

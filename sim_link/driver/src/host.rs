@@ -9,7 +9,7 @@ use handeye_geometry::progress::CancelToken;
 use super::cell::{DriverCell, DriverCellSpec};
 use super::error::DriverError;
 use super::options::{DriverOptions, Preparing};
-use super::pending::PendingStart;
+use super::pending::{PendingStart, Waited};
 use super::starts::{Failure, Permit, Starts};
 
 /// How long until a start that is being prepared is looked at again.
@@ -117,17 +117,19 @@ impl DriverHost {
         };
         let halt = pending.halt.clone();
         match pending.wait() {
-            Err((pending, error)) => {
+            Waited::Preparing(pending, error) => {
                 kept.pending = Some(pending);
                 // The one under way is a try, too.
                 Err(NoCell::Later { error, tries: kept.starts.tries() + 1, pause: LOOK_AGAIN })
             }
-            Ok(Ok(cell)) => {
+            Waited::Ended(Ok(cell)) => {
                 kept.starts.began(self.now_s());
                 Ok(kept.cell.insert(cell).clone())
             }
-            Ok(Err(error)) if halt.is_cancelled() => Err(NoCell::Rests { error: kept.error.clone().or(Some(error)) }),
-            Ok(Err(error)) => Err(self.failed(&mut kept, error)),
+            Waited::Ended(Err(error)) if halt.is_cancelled() => {
+                Err(NoCell::Rests { error: kept.error.clone().or(Some(error)) })
+            }
+            Waited::Ended(Err(error)) => Err(self.failed(&mut kept, error)),
         }
     }
 

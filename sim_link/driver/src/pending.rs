@@ -22,6 +22,14 @@ pub struct PendingStart {
     pub halt: CancelToken,
 }
 
+/// What became of a start that was waited for.
+pub(super) enum Waited {
+    /// It is over.
+    Ended(Result<DriverCell, DriverError>),
+    /// It goes on, with what is being done.
+    Preparing(PendingStart, DriverError),
+}
+
 impl PendingStart {
     /// Begins it. Raising `cancel` gives it up as well.
     ///
@@ -44,22 +52,19 @@ impl PendingStart {
     }
 
     /// Waits for its end, or until the driver says that it is being prepared: then it goes on.
-    ///
-    /// # Errors
-    /// The start itself, with what is being done.
-    pub fn wait(self) -> Result<Result<DriverCell, DriverError>, (Self, DriverError)> {
+    pub fn wait(self) -> Waited {
         loop {
             match self.started.recv_timeout(POLL) {
-                Ok(started) => return Ok(started),
+                Ok(started) => return Waited::Ended(started),
                 Err(RecvTimeoutError::Disconnected) => {
                     let why = "the thread that starts it failed".to_owned();
-                    return Ok(Err(DriverError::Start { command: self.driver, why }));
+                    return Waited::Ended(Err(DriverError::Start { command: self.driver, why }));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if let Some(what) = self.preparing.text() {
                 let error = DriverError::Preparing { driver: self.driver.clone(), what };
-                return Err((self, error));
+                return Waited::Preparing(self, error);
             }
         }
     }

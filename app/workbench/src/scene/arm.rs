@@ -114,7 +114,7 @@ mod tests {
     /// The Panda has seven joints; its hand hangs on the last one.
     #[test]
     fn any_other_arm_is_drawn_as_tubes_that_hang_together_from_its_foot_to_its_tip() {
-        let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../assets/scenes/panda.toml");
+        let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes/panda.toml");
         let scene = Scene::load(&scene).and_then(|scene| scene.resolve(0)).expect("it is shipped");
         let kinematics = ArmKinematics::new(scene.arm.clone(), scene.world_from_arm);
         let facts = CellFacts { arm: Some(kinematics.clone()), ..sample::connected().cell.expect("connected") };

@@ -59,7 +59,7 @@ fn ending(driver: &Driver) -> Ending {
 fn the_template_gives_images_with_the_pose_at_their_instant_and_moves_once_it_is_armed() {
     let Some(python) = python() else { return };
     let cancel = CancelToken::default();
-    let spec = DriverCellSpec { robot: command(&python, "../assets/drivers/template.py", &[]), camera: None };
+    let spec = DriverCellSpec { robot: command(&python, "../../assets/drivers/template.py", &[]), camera: None };
     let cell = DriverCell::start(&spec, &options(), &cancel).unwrap();
     let robot = cell.robot();
     let start = robot.first_state(PATIENCE, &cancel).unwrap().reading.joints.unwrap();
@@ -96,7 +96,7 @@ fn the_template_gives_images_with_the_pose_at_their_instant_and_moves_once_it_is
 #[test]
 fn a_motion_is_stopped_on_its_way_by_whoever_asks_for_it() {
     let Some(python) = python() else { return };
-    let driver = start(&command(&python, "../assets/drivers/template.py", &[])).unwrap();
+    let driver = start(&command(&python, "../../assets/drivers/template.py", &[])).unwrap();
     driver.first_state(PATIENCE, &CancelToken::default()).unwrap();
     driver.arm(true).unwrap();
     let goal = Goal::Joints(JointValues::from_fn(6, |_| 3.0));
@@ -437,7 +437,7 @@ mod slow {
     #[test]
     fn the_template_passes_the_conformance_test() {
         let Some(python) = python() else { return };
-        let report = report(&command(&python, "../assets/drivers/template.py", &[]), true);
+        let report = report(&command(&python, "../../assets/drivers/template.py", &[]), true);
         assert!(report.passed, "{}", report.text());
         assert!(!report.text().contains("warning"), "{}", report.text());
     }

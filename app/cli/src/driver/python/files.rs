@@ -56,7 +56,9 @@ pub fn cache() -> Result<PathBuf, EnvironmentError> {
 /// does not change what another runs.
 pub fn written() -> Result<PathBuf, EnvironmentError> {
     let mut hasher = DefaultHasher::new();
-    ALL.iter().for_each(|driver| driver.source.hash(&mut hasher));
+    for driver in ALL {
+        driver.source.hash(&mut hasher);
+    }
     SHARED.1.hash(&mut hasher);
     let folder = cache()?.join(format!("files-{:016x}", hasher.finish()));
     let failed = |path: &Path, error: &std::io::Error| EnvironmentError::NotWritten {
