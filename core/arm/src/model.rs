@@ -60,7 +60,7 @@ impl ArmKind {
 }
 
 impl ArmModel {
-    /// The arm; where it stands and its tool are for [`super::place`] to find.
+    /// The arm; where it stands and its tool are for `handeye_estimate::placement::place` to find.
     ///
     /// # Errors
     /// [`ArmError`] for rows that no arm has.

@@ -58,7 +58,7 @@ pub struct Shot<'a> {
     pub joints_rad: &'a [f64],
     /// Colour.
     pub rgb: &'a RgbImage,
-    /// The same in grey, see [`handeye_images::gray_from_rgb`].
+    /// The same in grey, see `handeye_images::gray_from_rgb`.
     pub grey: &'a GrayImage,
     /// Depth, from a camera that measures it.
     pub depth: Option<&'a DepthImage>,

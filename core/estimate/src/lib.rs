@@ -677,7 +677,7 @@ pub enum ViewStatus {
 }
 
 /// Fits hand-eye and camera to observations. Whether the data agree with the model is not looked at:
-/// [`diagnose::calibrate`](crate::diagnose::calibrate) does that as well.
+/// [`diagnose::calibrate`] does that as well.
 ///
 /// `work` is a `&CancelToken`, or a [`Work`] to follow the progress too.
 ///

@@ -422,7 +422,7 @@ pub struct TruthComparison {
 pub struct Provenance {
     /// Version of the program.
     pub tool_version: String,
-    /// [`crate::Dataset::input_sha256`].
+    /// `handeye_dataset::Dataset::input_sha256`.
     pub input_sha256: Option<String>,
     /// Every option that the result depends on.
     pub options: serde_json::Map<String, serde_json::Value>,

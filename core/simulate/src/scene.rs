@@ -15,7 +15,7 @@ use handeye_geometry::testing::looking_at;
 
 /// An image to be taken of a target.
 ///
-/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper without end. Any target by [`Scene::drawn`]
+/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper without end. Any target by `Scene::drawn` (feature `print`)
 /// is the drawing that is printed, sampled ten by ten in pixels that an outline crosses, on its paper on a table.
 pub struct Scene {
     /// The camera, with its lens.

@@ -94,7 +94,7 @@ pub fn fitted_view(model: &Model) -> Option<SceneView> {
     Some(SceneView { centre_m: extent.centre.into(), distance_m: extent.distance_m(), ..SceneView::default() })
 }
 
-/// The corners of the end of the pyramid that a camera sees, so far away [m], in its frame: top left, top right, bottom
+/// The corners of the end of the pyramid that a camera sees, so far away \[m\], in its frame: top left, top right, bottom
 /// right, bottom left. The bend of the lens is not in it.
 pub fn frustum_end(intrinsics: &Intrinsics, length_m: f64) -> [Point3<f64>; 4] {
     let Intrinsics { width, height, fx, fy, cx, cy, .. } = *intrinsics;
