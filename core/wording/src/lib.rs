@@ -13,8 +13,8 @@
 //! ```
 //! use handeye_wording::{English, text};
 //!
-//! let freedom = text!("{n} {n|degree|degrees} of freedom", n = 12);
-//! assert_eq!(freedom.say(English), "12 degrees of freedom");
+//! let size = text!("{count} bytes", count = 12);
+//! assert_eq!(size.say(English), "12 bytes");
 //! ```
 //!
 //! Depends on `serde` and its own derive macro alone.
