@@ -54,10 +54,15 @@ fn literal(source: &str) -> Option<String> {
     None
 }
 
+/// The folder of the workspace.
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("a workspace")
+}
+
 fn all_sources() -> Vec<(PathBuf, String)> {
     let mut files = Vec::new();
-    for folder in ["..", "../../core", "../../sim_link"] {
-        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
+    for folder in ["app", "core", "sim_link"] {
+        sources(&root().join(folder), &mut files);
     }
     files.retain(|file| file.components().any(|part| part.as_os_str() == "src"));
     let read = |file: PathBuf| std::fs::read_to_string(&file).map(|source| (file, source)).expect("a source");
@@ -108,7 +113,7 @@ fn phrases() -> BTreeSet<String> {
 }
 
 fn own_sources() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    root().join("app")
 }
 
 #[test]
@@ -239,7 +244,7 @@ fn skeleton(readme: &str) -> (Vec<usize>, Vec<String>, BTreeSet<&str>) {
 
 #[test]
 fn the_chinese_readme_has_the_commands_and_the_documents_of_the_english_one() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = root();
     let [english, chinese] =
         ["README.md", "README.zh-CN.md"].map(|name| std::fs::read_to_string(root.join(name)).expect(name));
     let (english, chinese) = (skeleton(&english), skeleton(&chinese));
