@@ -24,7 +24,7 @@
 //!
 //! use handeye_dataset::Dataset;
 //!
-//! let dataset = Dataset::open(Path::new("recording"))?;
+//! let dataset = Dataset::read(Path::new("recording"))?;
 //! println!("{} of {}", dataset.target, dataset.folder.display());
 //! # Ok::<(), handeye_dataset::DatasetError>(())
 //! ```

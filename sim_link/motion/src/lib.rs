@@ -9,7 +9,7 @@
 //! let limits = MotionLimits::uniform(1, 1.0, 2.0, 10.0);
 //! let mut motion = JointMotion::new(MotionState::at_rest(vec![0.0]), &[0.5], &[0.0], Some(&limits), Sync::Time)?;
 //! while !motion.step(0.01).finished {}
-//! assert_eq!(motion.state().pos, [0.5]);
+//! assert_eq!(motion.at(motion.duration_s()).pos, [0.5]);
 //! # Ok::<(), handeye_motion::MotionError>(())
 //! ```
 
