@@ -85,7 +85,7 @@ fn document(
     if !observations.target_is_known {
         said.insert(TARGET_OPTION.to_owned(), Value::Null);
     }
-    let mut result = CalibrationResult::of(&calibration, env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
+    let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
     result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
     Ok(result)
 }
