@@ -28,7 +28,7 @@
 //! # Ok::<(), handeye_track::TrackError>(())
 //! ```
 //!
-//! Depends on `handeye_detect` and `handeye_estimate`; never on a file, a window or a socket.
+//! Depends on `handeye_detect` and `handeye_estimate`; never on a window or a socket.
 
 mod by_depth;
 mod corner;
