@@ -171,18 +171,25 @@ impl Engine {
     /// Does what is due at a time on the server's clock: goes on with calls, runs at most one pass.
     pub fn turn(&mut self, now: Duration) {
         self.cell.now = now;
-        for uuid in self.clients.expired(now) {
-            // One that holds nothing is missed by nobody: a connection that waits for work is silent for long.
-            if self.clients.holds_anything(&uuid) {
-                tracing::info!(uuid, "a client that held the simulation is no longer heard of: it is released");
-            }
-            self.forget(&uuid);
+        for uuid in self.forget_silent(now) {
+            tracing::info!(uuid, "a client that held the simulation is no longer heard of: it is released");
         }
         self.resume_calls();
         self.break_silence(now);
         if self.is_pass_due(now) {
             self.run_pass(now);
         }
+    }
+
+    /// Forgets the clients that are no longer heard of, and returns those that held the simulation: nobody misses the
+    /// others, since a connection that waits for work is silent for long.
+    fn forget_silent(&mut self, now: Duration) -> Vec<String> {
+        let (held, idle): (Vec<_>, Vec<_>) =
+            self.clients.expired(now).into_iter().partition(|uuid| self.clients.holds_anything(uuid));
+        for uuid in held.iter().chain(&idle) {
+            self.forget(uuid);
+        }
+        held
     }
 
     fn is_pass_due(&self, now: Duration) -> bool {

@@ -357,46 +357,16 @@ fn a_silent_client_is_forgotten_after_the_time_that_it_named() {
     assert!(bench.time_s() > 0.0);
 }
 
-/// Counts what is logged.
-struct Count(std::sync::Arc<std::sync::atomic::AtomicUsize>);
-
-impl tracing::Subscriber for Count {
-    fn enabled(&self, _: &tracing::Metadata<'_>) -> bool {
-        true
-    }
-
-    fn new_span(&self, _: &tracing::span::Attributes<'_>) -> tracing::span::Id {
-        tracing::span::Id::from_u64(1)
-    }
-
-    fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
-
-    fn record_follows_from(&self, _: &tracing::span::Id, _: &tracing::span::Id) {}
-
-    fn event(&self, _: &tracing::Event<'_>) {
-        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-    }
-
-    fn enter(&self, _: &tracing::span::Id) {}
-
-    fn exit(&self, _: &tracing::span::Id) {}
-}
-
 #[test]
-fn a_client_that_is_forgotten_is_logged_only_when_it_held_the_simulation() {
-    let logged = std::sync::Arc::default();
-    tracing::subscriber::with_default(Count(std::sync::Arc::clone(&logged)), || {
-        let mut bench = Bench::new();
-        let count = || logged.load(std::sync::atomic::Ordering::Relaxed);
-        bench.call(A, "sim.getSimulationTime", vec![]);
-        bench.now += Duration::from_hours(1);
-        bench.turn();
-        assert_eq!(count(), 0, "it waited for work");
-        bench.call(A, "sim.setStepping", vec![Value::from(true)]);
-        bench.now += Duration::from_hours(1);
-        bench.turn();
-        assert_eq!(count(), 1);
-    });
+fn of_clients_that_are_forgotten_those_that_held_the_simulation_are_reported() {
+    let mut bench = Bench::new();
+    bench.call(A, "sim.getSimulationTime", vec![]);
+    bench.now += Duration::from_hours(1);
+    assert_eq!(bench.engine.forget_silent(bench.now), [""; 0], "it waited for work");
+    bench.call(A, "sim.setStepping", vec![Value::from(true)]);
+    bench.now += Duration::from_hours(1);
+    assert_eq!(bench.engine.forget_silent(bench.now), [A]);
+    assert_eq!(bench.engine.forget_silent(bench.now), [""; 0], "it is forgotten");
 }
 
 #[test]
