@@ -42,7 +42,7 @@ impl Workbench {
         });
         let began = Instant::now();
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(handeye_workbench::connect::connector);
+        let connect: Connect = Arc::new(CellSource::cell);
         let start = Start {
             source,
             view: ViewSettings::default(),

@@ -6,9 +6,9 @@ use clap::{Args as _, Command};
 
 use super::driver::{DriverArgs, python};
 use handeye_driver::DriverSpec;
-use handeye_workbench::connect::drivers::offered::FieldKind::{Switch, Text, Word};
-use handeye_workbench::connect::drivers::offered::Rank::Needed;
-use handeye_workbench::connect::drivers::offered::{ALL, Field, ON, Offered, Part, Values, of_part, parse};
+use handeye_workbench::connect::offered::FieldKind::{Switch, Text, Word};
+use handeye_workbench::connect::offered::Rank::Needed;
+use handeye_workbench::connect::offered::{ALL, Field, ON, Offered, Part, Values, of_part, parse};
 
 /// Options that make no sense in a window: who listens is another driver, and RTDE has one port.
 const NOT_OFFERED: [(&str, &str); 2] = [("fake", "--listen"), ("ur-rtde", "--port")];

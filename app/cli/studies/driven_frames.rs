@@ -21,9 +21,9 @@ use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_driver::fake::{Fake, FakeOptions, FakePart};
 use handeye_geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_link::limits;
 use handeye_server::{CellConfig, CellServer};
 use handeye_workbench::command::Command;
-use handeye_workbench::limits;
 use handeye_workbench::model::{
     Axis, CapturePurpose, CellSource, Drivers, Jog, JogFrame, JogSettings, JogStep, Model, Motion, SolveStatus,
 };

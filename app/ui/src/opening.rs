@@ -90,7 +90,7 @@ impl Opening {
         let waker = waker_of(ctx)?;
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(handeye_workbench::connect::connector);
+        let connect: Connect = Arc::new(CellSource::cell);
         let start = Start {
             source,
             view: remembered.view(settings.view()),

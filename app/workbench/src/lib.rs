@@ -14,7 +14,6 @@ pub mod guided;
 pub mod import;
 pub mod jpeg;
 pub mod keep_out;
-pub mod limits;
 pub mod live;
 pub mod messages;
 pub mod model;

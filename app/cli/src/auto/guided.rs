@@ -16,7 +16,7 @@ use handeye_session::CaptureId;
 use super::super::Failure;
 use super::super::towards_board::TowardsBoard;
 use super::sequence::PoseSequence;
-use handeye_workbench::limits;
+use handeye_link::limits;
 use handeye_workbench::model::CapturePurpose;
 use handeye_workbench::text::Language;
 

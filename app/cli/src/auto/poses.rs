@@ -9,7 +9,7 @@ use handeye_dataset::taught_poses::{Goal, MotionLimits, TaughtPoses};
 use handeye_plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
 
 use super::super::{Failure, towards_board};
-use handeye_workbench::limits;
+use handeye_link::limits;
 use handeye_workbench::session::start::{BOARD, REFERENCE_POSES};
 
 /// How much the board is tilted at most where guided capture begins.

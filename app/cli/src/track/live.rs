@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 use crate::late::Late;
 use crate::towards_board::TowardsBoard;
 use crate::{Failure, record};
-use handeye_workbench::limits;
+use handeye_link::limits;
 use handeye_workbench::model::{FollowStatus, FollowWish, Step, Tracked};
 use handeye_workbench::rerun_log::{Entry, Recorder};
 use handeye_workbench::session::start::REFERENCE_POSES;

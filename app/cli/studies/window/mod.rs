@@ -36,7 +36,7 @@ impl Drawn {
         let began = Instant::now();
         let clock: Clock = Arc::new(move || began.elapsed().as_secs_f64());
         let waker: Waker = Arc::new(|| {});
-        let connect: Connect = Arc::new(handeye_workbench::connect::connector);
+        let connect: Connect = Arc::new(CellSource::cell);
         let start = Start {
             source,
             view: ViewSettings::default(),

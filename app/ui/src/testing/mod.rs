@@ -23,7 +23,7 @@ use handeye_workbench::rerun_log::RerunChoice;
 use handeye_workbench::settings::SettingsFile;
 use handeye_workbench::text::Text;
 use handeye_workbench::worker::fake::FakeCell;
-use handeye_workbench::worker::{Clock, Connector, PortError, Waker};
+use handeye_workbench::worker::{Cell, Clock, PortError, Waker};
 
 /// The window over workers that have nothing to say: the tests are the only ones that report.
 pub struct Silent {
@@ -53,7 +53,7 @@ impl Silent {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
         cell.script().refusals = vec![PortError::Hopeless(Text::verbatim("not in this test")); 2];
-        let connect: Connect = Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>);
+        let connect: Connect = Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Cell>);
         let clock: Clock = Arc::new(|| 100.0);
         let (wake, woken) = crossbeam_channel::bounded(1);
         let waker: Waker = wakes(wake);

@@ -18,13 +18,13 @@ use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
 use crate::rerun_log::{Pace, Recorder, RecorderOptions, Relay, RerunChoice, WebViewer};
 use crate::settings::SettingsWrite;
-use crate::worker::{Clock, Connector, FileTask, SessionThreads, StopLine, Waker, Workers};
+use crate::worker::{Cell, Clock, FileTask, SessionThreads, StopLine, Waker, Workers};
 use handeye_wording::text;
 
 pub use reach::Reach;
 
 /// Makes what connects to a cell.
-pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Connector> + Send + Sync>;
+pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Cell> + Send + Sync>;
 
 /// What an application begins with.
 pub struct Start {

@@ -31,7 +31,7 @@ pub(super) struct Bench {
 
 pub(super) fn bench(cell: &FakeCell) -> Bench {
     let cell = cell.clone();
-    bench_with(Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Connector>))
+    bench_with(Arc::new(move |_source, _objects| Arc::new(cell.clone()) as Arc<dyn Cell>))
 }
 
 fn bench_with(connect: Connect) -> Bench {
@@ -66,7 +66,7 @@ fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_addres
     let cell = FakeCell::new(0);
     let mut bench = bench_with(Arc::new(move |source, objects| {
         noted.lock().expect("whole").push((source.clone(), objects.clone()));
-        Arc::new(cell.clone()) as Arc<dyn Connector>
+        Arc::new(cell.clone()) as Arc<dyn Cell>
     }));
     let connected = LinkState::Connected { server: "a cell".to_owned(), address: "tcp://127.0.0.1:9".to_owned() };
     let panda = CellPaths::below("Panda");

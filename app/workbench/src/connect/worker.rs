@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use handeye_coppeliasim::CancelToken;
+use handeye_driver::LogLevel;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::stop_line::StopLine;
@@ -11,8 +12,8 @@ use crate::command::Event;
 use crate::model::{BoardMotion, CellSource, Link, RobotState, Severity, Simulation};
 use crate::worker::MAX_EVENTS;
 use crate::worker::link::{Duty, Outlet};
-use crate::worker::port::{Connected, Connector, ControlPort, PortError};
 use crate::worker::slot::LatestSlot;
+use handeye_link::{Cell, Connected, ControlPort, PortError};
 use handeye_wording::text;
 
 /// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
@@ -76,12 +77,8 @@ impl Duty for Control {
     type Task = ControlTask;
     const LINK: Link = Link::Control;
 
-    fn connect(
-        &mut self,
-        connector: &dyn Connector,
-        shutdown: &CancelToken,
-    ) -> Result<Connected<Self::Port>, PortError> {
-        let mut connected = connector.connect_control(shutdown)?;
+    fn connect(&mut self, connector: &dyn Cell, shutdown: &CancelToken) -> Result<Connected<Self::Port>, PortError> {
+        let mut connected = connector.control(shutdown)?;
         self.owes_facts = true;
         if self.start_by_itself && connected.port.state()?.is_some_and(|state| state.simulation == Simulation::Stopped)
         {
@@ -95,7 +92,13 @@ impl Duty for Control {
         if std::mem::take(&mut self.owes_facts) || port.facts_differ() {
             outlet.report(Event::Cell(Box::new(port.facts()?)));
         }
-        for (severity, words) in port.heard() {
+        for (level, words) in port.heard() {
+            let severity = match level {
+                LogLevel::Error => Severity::Error,
+                LogLevel::Warn => Severity::Warning,
+                LogLevel::Info => Severity::Info,
+                LogLevel::Debug => continue,
+            };
             if outlet.events.len() < MAX_EVENTS {
                 outlet.report(Event::Heard { severity, words });
             } else {

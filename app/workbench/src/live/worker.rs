@@ -10,9 +10,9 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 use crate::live::depth;
 use crate::model::{ColouredDepth, DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
 use crate::worker::link::{Duty, Outlet};
-use crate::worker::port::{CameraPort, Connected, Connector, Newest, PortError, RawFrame};
 use crate::worker::rate::RateMeter;
 use crate::worker::slot::{LatestSlot, Tap};
+use handeye_link::{CameraPort, Cell, Connected, Newest, PortError, RawFrame};
 use handeye_wording::text;
 
 /// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
@@ -110,14 +110,10 @@ impl Duty for Camera {
     type Task = CameraTask;
     const LINK: Link = Link::Camera;
 
-    fn connect(
-        &mut self,
-        connector: &dyn Connector,
-        shutdown: &CancelToken,
-    ) -> Result<Connected<Self::Port>, PortError> {
+    fn connect(&mut self, connector: &dyn Cell, shutdown: &CancelToken) -> Result<Connected<Self::Port>, PortError> {
         self.seen_sim_time_s = None;
         self.rate = RateMeter::default();
-        connector.connect_camera(shutdown)
+        connector.camera(shutdown)
     }
 
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {

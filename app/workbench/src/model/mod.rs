@@ -35,10 +35,7 @@ pub use crate::live::state::{
     exports_of,
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
-pub use crate::motion::state::{
-    ArmDoubt, AskedMove, Axis, CellFacts, Jog, JogFrame, JogSettings, JogStep, JointFacts, Motion, MotionGoal,
-    MotionId, MotionOutcome, MotionRequest, Moves, Truth,
-};
+pub use crate::motion::state::{AskedMove, JogSettings, JogStep, Motion, MotionId, MotionRequest};
 pub use crate::rerun_log::state::{RerunState, ViewerState};
 pub use crate::session::state::{
     FolderEntry, FolderKind, FolderListing, Observed, PoseSequence, RecentSession, Review, SessionState, StopOutcome,
@@ -47,10 +44,14 @@ pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
 pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
 pub use crate::track::state::{
-    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
+    FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
 };
 pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
 pub use handeye_coppeliasim::cell::BoardPath;
+pub use handeye_link::{
+    ArmDoubt, Axis, BoardMotion, CellFacts, CellSource, Drivers, Jog, JogFrame, JointFacts, MotionGoal, MotionOutcome,
+    Moves, RobotState, Simulation, Truth,
+};
 pub use workflow::{Dialog, Pane, Step};
 
 use crate::keep_out::state::KeepOut;
@@ -61,48 +62,6 @@ use crate::text::{Language, Text};
 
 /// Old enough \[s\] to say so: an image or a reading of the robot that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
-
-/// Which cell the window works with.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub enum CellSource {
-    /// The cell inside this program, started by it, with this scene.
-    BuiltIn(SceneChoice),
-    /// A server that runs already.
-    Address(String),
-    /// Programs that speak the driver protocol.
-    Drivers(Drivers),
-}
-
-impl CellSource {
-    /// Whether it is the cell inside this program, of any scene.
-    pub fn is_built_in(&self) -> bool {
-        matches!(self, Self::BuiltIn(_))
-    }
-}
-
-impl Default for CellSource {
-    fn default() -> Self {
-        Self::BuiltIn(SceneChoice::default())
-    }
-}
-
-/// Commands or addresses of drivers. Without one for the robot a person types its poses.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Drivers {
-    /// The robot's, which may have the images, too.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub robot: Option<String>,
-    /// The camera's, where it is another program.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub camera: Option<String>,
-}
-
-impl fmt::Display for Drivers {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named: Vec<&str> = self.robot.iter().chain(&self.camera).map(String::as_str).collect();
-        f.write_str(&named.join(" + "))
-    }
-}
 
 /// The connections to the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -176,32 +135,6 @@ impl LinkState {
     pub fn is_connected(&self) -> bool {
         matches!(self, Self::Connected { .. })
     }
-}
-
-/// Whether simulated time advances.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Simulation {
-    /// It does not; images are not renewed.
-    Stopped,
-    /// It does not for now.
-    Paused,
-    /// It does.
-    Running,
-}
-
-/// The robot at one instant.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RobotState {
-    /// The tip as the controller reports it.
-    pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\]; none where they are not reported.
-    pub joints_rad: JointValues,
-    /// Simulated time \[s\]; of a robot behind a driver, time of the workbench.
-    pub sim_time_s: f64,
-    /// Whether it advances.
-    pub simulation: Simulation,
-    /// Whether a robot behind a driver may be moved.
-    pub is_armed: bool,
 }
 
 /// Which depths the colour map covers.

@@ -15,7 +15,7 @@ use crate::guided::state::GuideRequest;
 use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text::Text;
 use crate::worker::Waker;
-use crate::worker::port::{JogRequest, ViewsRequest};
+use handeye_link::{JogRequest, ViewsRequest};
 use handeye_wording::text;
 
 /// A motion with an end.

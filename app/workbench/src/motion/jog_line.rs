@@ -1,7 +1,7 @@
 //! The way of a held jog button to the arm: a dead man's switch. No thread, no clock: the caller says what time it is.
 
 use crate::model::Jog;
-use crate::worker::port::JogRequest;
+use handeye_link::JogRequest;
 
 /// A button counts as held for so long \[s\] after the window last said so: a few frames of a busy window, and short
 /// enough for an arm that nobody holds.

@@ -4,7 +4,6 @@ pub(crate) mod ask;
 pub mod desk;
 pub mod grip;
 pub(crate) mod jog_line;
-pub(crate) mod live;
 pub(crate) mod rest;
 pub(crate) mod state;
 pub(crate) mod update;

@@ -1,7 +1,7 @@
 //! What the states say of an arm that was stopped.
 
-use handeye_arm::JointKind;
-use handeye_driver::{Moved, Place, RestWatch};
+use handeye_driver::{Place, RestWatch};
+use handeye_link::moved_text;
 
 use crate::app::App;
 use crate::model::{Moves, RobotState, Severity, Simulation};
@@ -77,20 +77,4 @@ impl App {
 fn place(robot: &RobotState) -> Place {
     let joints = Some(robot.joints_rad).filter(|joints| !joints.is_empty());
     Place { stamp_s: robot.sim_time_s, joints, base_from_tip: robot.base_from_tip }
-}
-
-/// How an arm moved, for people.
-pub fn moved_text(moved: &Moved, kind: impl Fn(usize) -> Option<JointKind>) -> Text {
-    match *moved {
-        Moved::Joint { index, from, to } => {
-            let kind = kind(index).unwrap_or(JointKind::Revolute);
-            let said = |value| format!("{:.1}", kind.quantity(value)).replace('-', "−");
-            text!("joint {joint} from {from} to {to}", joint = index + 1, from = said(from), to = said(to))
-        }
-        Moved::Tip { distance_m, angle_rad } => text!(
-            "the tip by {mm} mm and {deg}°",
-            mm = format!("{:.1}", distance_m * 1e3),
-            deg = format!("{:.1}", angle_rad.to_degrees())
-        ),
-    }
 }

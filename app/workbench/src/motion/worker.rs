@@ -16,7 +16,7 @@ use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionO
 use crate::text::Text;
 use crate::track::follow_line::FollowLine;
 use crate::worker::link::{Duty, Outlet};
-use crate::worker::port::{Connected, Connector, JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use handeye_link::{Cell, Connected, JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use handeye_wording::text;
 
 /// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
@@ -183,12 +183,8 @@ impl Duty for Motions {
     type Task = MotionLook;
     const LINK: Link = Link::Motion;
 
-    fn connect(
-        &mut self,
-        connector: &dyn Connector,
-        shutdown: &CancelToken,
-    ) -> Result<Connected<Self::Port>, PortError> {
-        let connected = connector.connect_motion(shutdown)?;
+    fn connect(&mut self, connector: &dyn Cell, shutdown: &CancelToken) -> Result<Connected<Self::Port>, PortError> {
+        let connected = connector.motion(shutdown)?;
         self.desk.connected();
         Ok(connected)
     }

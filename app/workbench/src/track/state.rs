@@ -1,5 +1,6 @@
 //! The board as it is tracked, and the arm that follows it.
 
+use handeye_link::BoardMotion;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -112,13 +113,4 @@ pub struct TrackState {
     pub board: BoardMotion,
     /// Whether this program asked the cell to hide its board.
     pub board_hidden: bool,
-}
-
-/// How a simulated cell moves its board.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct BoardMotion {
-    /// Along which path.
-    pub path: BoardPath,
-    /// How fast [m/s].
-    pub speed_m_s: f64,
 }

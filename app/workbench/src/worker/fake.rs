@@ -6,6 +6,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use handeye_arm::{ArmKind, JointKind, JointValues};
 use handeye_coppeliasim::CancelToken;
 use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
+use handeye_driver::LogLevel;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::Pose;
@@ -14,12 +15,11 @@ use handeye_plan::guided::choose::Robot;
 use image::{Rgb, RgbImage};
 use nalgebra::Isometry3;
 
-use super::port::{
-    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room,
-    ViewsRequest,
-};
-use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Severity, Simulation};
+use crate::model::{BoardMotion, CellFacts, MotionGoal, MotionOutcome, Moves, RobotState, Simulation};
 use crate::text::Text;
+use handeye_link::{
+    CameraPort, Cell, Connected, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room, ViewsRequest,
+};
 use handeye_wording::text;
 
 /// Width and height of the fake images in pixels.
@@ -152,16 +152,16 @@ impl FakeCell {
     }
 }
 
-impl Connector for FakeCell {
-    fn connect_control(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+impl Cell for FakeCell {
+    fn control(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
         self.connected(Box::new(self.clone()))
     }
 
-    fn connect_camera(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+    fn camera(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
         self.connected(Box::new(self.clone()))
     }
 
-    fn connect_motion(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+    fn motion(&self, _shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
         if self.script().broken {
             return Err(PortError::Lost(Text::verbatim("nothing answers")));
         }
@@ -232,10 +232,10 @@ impl ControlPort for FakeCell {
         Ok(())
     }
 
-    fn heard(&mut self) -> Vec<(Severity, String)> {
+    fn heard(&mut self) -> Vec<(LogLevel, String)> {
         let mut script = self.script();
         script.asked_for_lines += 1;
-        vec![(Severity::Info, "a line".to_owned()); script.lines]
+        vec![(LogLevel::Info, "a line".to_owned()); script.lines]
     }
 }
 

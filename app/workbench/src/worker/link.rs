@@ -5,12 +5,12 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError};
 use handeye_coppeliasim::CancelToken;
 
-use super::port::{Connected, Connector, PortError};
 use super::reconnect::Reconnect;
 use super::{Clock, Waker};
 use crate::command::Event;
 use crate::model::{Link, Severity};
 use crate::text::Text;
+use handeye_link::{Cell, Connected, PortError};
 
 /// What a worker is asked for.
 #[derive(Debug)]
@@ -67,11 +67,7 @@ pub trait Duty: Send {
     ///
     /// # Errors
     /// [`PortError`].
-    fn connect(
-        &mut self,
-        connector: &dyn Connector,
-        shutdown: &CancelToken,
-    ) -> Result<Connected<Self::Port>, PortError>;
+    fn connect(&mut self, connector: &dyn Cell, shutdown: &CancelToken) -> Result<Connected<Self::Port>, PortError>;
 
     /// One round of the regular work; returns how long to rest before the next.
     ///
@@ -91,7 +87,7 @@ pub struct LinkLoop<'a, D: Duty> {
     /// What it does.
     pub duty: D,
     /// How it connects.
-    pub connector: &'a dyn Connector,
+    pub connector: &'a dyn Cell,
     /// What it is asked for; closed when the application ends.
     pub requests: Receiver<Request<D::Task>>,
     /// Where it reports to.

@@ -47,11 +47,11 @@ fn arm(server: &CellServer) -> Arm {
 impl Live {
     fn new(real_time: bool) -> Self {
         let server = server(real_time);
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::at(server.endpoint(), CellPaths::default()));
+        let connector: Arc<dyn Cell> = Arc::new(RemoteCell::at(server.endpoint(), CellPaths::default()));
         Self::with(server, &connector)
     }
 
-    fn with(server: CellServer, connector: &Arc<dyn Connector>) -> Self {
+    fn with(server: CellServer, connector: &Arc<dyn Cell>) -> Self {
         let mut watch = arm(&server);
         watch.sim().start_simulation().expect("a call");
         let bench = Bench::start(&source(&server), connector);
@@ -114,8 +114,8 @@ fn a_cell_of_this_project_is_called_so_and_its_facts_are_known() {
         range: Some([-std::f64::consts::TAU, std::f64::consts::TAU]),
     };
     assert_eq!(facts.joints, [turn; 6]);
-    let connector = LiveConnector::at(live.server.endpoint(), CellPaths::default());
-    let connected = connector.connect_motion(&CancelToken::default()).expect("it is there");
+    let connector = RemoteCell::at(live.server.endpoint(), CellPaths::default());
+    let connected = connector.motion(&CancelToken::default()).expect("it is there");
     assert_eq!(connected.server, "Handeye cell");
 }
 
@@ -200,24 +200,24 @@ fn the_arm_does_not_go_into_a_box_that_a_person_keeps_it_out_of() {
 fn a_stop_works_while_the_connection_for_motions_hangs() {
     /// Control is real, motions hang for ever.
     struct Half {
-        live: LiveConnector,
+        live: RemoteCell,
         fake: FakeCell,
     }
-    impl Connector for Half {
-        fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
-            self.live.connect_control(shutdown)
+    impl Cell for Half {
+        fn control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+            self.live.control(shutdown)
         }
-        fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
-            self.live.connect_camera(shutdown)
+        fn camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+            self.live.camera(shutdown)
         }
-        fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
-            self.fake.connect_motion(shutdown)
+        fn motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+            self.fake.motion(shutdown)
         }
     }
     let server = server(true);
     let (fake, release) = FakeCell::that_never_answers();
-    let connector: Arc<dyn Connector> =
-        Arc::new(Half { live: LiveConnector::at(server.endpoint(), CellPaths::default()), fake });
+    let connector: Arc<dyn Cell> =
+        Arc::new(Half { live: RemoteCell::at(server.endpoint(), CellPaths::default()), fake });
     let mut live = Live::with(server, &connector);
     live.bench.move_to(1, MotionGoal::Joints([0.0; 6].into()), 1.0);
     let start = live.joints();

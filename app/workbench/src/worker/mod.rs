@@ -10,12 +10,9 @@
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
-pub(crate) mod cell_error;
 pub(crate) mod files;
 pub(crate) mod link;
-pub(crate) mod live;
 pub(crate) mod newest;
-pub(crate) mod port;
 pub(crate) mod rate;
 pub(crate) mod reconnect;
 mod shared;
@@ -42,7 +39,6 @@ pub use crate::connect::worker::ControlTask;
 pub use crate::live::worker::CameraTask;
 pub use crate::motion::desk::{MotionQueue, MotionTask};
 pub use crate::motion::jog_line::HELD_S;
-pub use crate::motion::live::end_of_following;
 pub use crate::motion::worker::MotionLook;
 pub use crate::session::archive::{ArchiveTask, Beginning, timestamp, timestamp_rfc3339};
 pub use crate::session::desk::SessionThreads;
@@ -51,12 +47,11 @@ pub use crate::solve::worker::{SolveJob, answer, examined};
 pub use crate::track::follow_line::FollowLine;
 pub use crate::track::worker::{TrackedImage, Tracking};
 pub use files::{ExportJob, FileTask};
-pub use link::Request;
-pub use live::LiveConnector;
-pub use port::{
-    CameraPort, Connected, Connector, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, Room,
-    ViewsRequest,
+pub use handeye_link::{
+    CameraPort, Cell, Connected, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, RemoteCell, Room,
+    ViewsRequest, end_of_following,
 };
+pub use link::Request;
 pub use slot::LatestSlot;
 pub use started::Started;
 pub use vision::VisionTask;
@@ -93,7 +88,7 @@ pub struct Workers {
     tracked: Arc<LatestSlot<Tracked>>,
     follow: Arc<FollowLine>,
     /// Until they end: a cell that it started ends with it.
-    connector: Option<Arc<dyn Connector>>,
+    connector: Option<Arc<dyn Cell>>,
     shutdown: CancelToken,
     threads: Vec<Started>,
 }
@@ -106,7 +101,7 @@ impl Workers {
     pub fn start(
         source: &CellSource,
         view: &ViewSettings,
-        connector: &Arc<dyn Connector>,
+        connector: &Arc<dyn Cell>,
         captures: Sender<Measured>,
         stop: &Arc<StopLine>,
         clock: &Clock,
@@ -146,7 +141,7 @@ impl Workers {
     fn idle(
         events: [Receiver<Event>; 2],
         stop: &Arc<StopLine>,
-        connector: &Arc<dyn Connector>,
+        connector: &Arc<dyn Cell>,
         clock: &Clock,
         waker: &Waker,
     ) -> Self {
@@ -181,7 +176,7 @@ impl Workers {
         name: &str,
         duty: D,
         source: &CellSource,
-        connector: &Arc<dyn Connector>,
+        connector: &Arc<dyn Cell>,
         outlet: Outlet,
     ) -> io::Result<Sender<Request<D::Task>>> {
         let (sender, requests) = bounded(MAX_REQUESTS);

@@ -26,7 +26,7 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    pub fn start(source: &CellSource, connector: &Arc<dyn Connector>) -> Self {
+    pub fn start(source: &CellSource, connector: &Arc<dyn Cell>) -> Self {
         let (wake, woken) = bounded(1);
         let waker: Waker = Arc::new(move || {
             // A full channel wakes as well as a fuller one.
@@ -122,7 +122,7 @@ const RIGHT: Jog = Jog::Joint { index: 0, forward: false };
 fn fake(motions: FakeMotions) -> (FakeCell, Bench) {
     let cell = FakeCell::new(1);
     cell.script().motions = motions;
-    let connector: Arc<dyn Connector> = Arc::new(cell.clone());
+    let connector: Arc<dyn Cell> = Arc::new(cell.clone());
     let bench = Bench::start(&CellSource::default(), &connector);
     (cell, bench)
 }

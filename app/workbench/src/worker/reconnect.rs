@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::port::PortError;
 use crate::model::{CellSource, LinkState};
 use crate::text::Text;
+use handeye_link::PortError;
 
 /// Pauses between tries. A person who starts the simulator waits for the first ones; a machine that is off for the
 /// night should not be bothered more often than the last.

@@ -24,7 +24,7 @@ impl Bench {
         let (wake, woken) = bounded(1);
         let waker: Waker = wakes(wake);
         let clock: Clock = Arc::new(|| 7.0);
-        let connector: Arc<dyn Connector> = Arc::new(cell.clone());
+        let connector: Arc<dyn Cell> = Arc::new(cell.clone());
         let workers =
             Workers::start(source, &ViewSettings::default(), &connector, bounded(1).0, &Arc::default(), &clock, &waker)
                 .expect("threads can be started");
@@ -121,7 +121,7 @@ fn the_newest_image_wins_and_the_others_are_counted() {
     let (wake, woken) = bounded(64);
     let waker: Waker = wakes(wake);
     let clock: Clock = Arc::new(|| 0.0);
-    let connector: Arc<dyn Connector> = Arc::new(cell.clone());
+    let connector: Arc<dyn Cell> = Arc::new(cell.clone());
     let workers = Workers::start(
         &CellSource::default(),
         &ViewSettings::default(),

@@ -8,12 +8,12 @@ use handeye_coppeliasim::cell::{Arm, CellPaths, MotionTolerance, SettleOptions};
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_geometry::frames::{Camera, Pose, Tip};
+use handeye_link::limits;
 use handeye_plan::guided::CHECKS;
 use handeye_server::{CellConfig, CellServer};
 use handeye_tests::handeye_binary;
 use handeye_tests::workbench::Workbench;
 use handeye_workbench::command::Command;
-use handeye_workbench::limits;
 use handeye_workbench::model::{
     CapturePurpose, CellSource, Drivers, JogSettings, LinkState, Model, Motion, SolveStatus,
 };

@@ -4,7 +4,7 @@ use egui::{ComboBox, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use crate::style::{form, parts};
 use crate::typed::MOST_TYPED;
-use handeye_workbench::connect::drivers::offered::{self, Field, FieldKind, Offered, Part, Rank, Values};
+use handeye_workbench::connect::offered::{self, Field, FieldKind, Offered, Part, Rank, Values};
 use handeye_workbench::model::{CellSource, Drivers, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;

@@ -5,11 +5,12 @@ use handeye_coppeliasim::cell::{JOG_JOINT_SPEED_RAD_S, JOG_LINE_SPEED_M_S, JOG_T
 
 use crate::style::parts;
 use crate::style::theme::{self, Palette};
+use handeye_link::limits;
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{JogFrame, JogSettings, JogStep, Model, Moves};
 use handeye_workbench::text::{Language, Text};
-use handeye_workbench::{limits, tr};
+use handeye_workbench::tr;
 
 /// Steps in millimetres, and in degrees for what turns: 50° at once would be a surprise.
 const STEPS: [(f64, f64); 5] = [(0.1, 0.1), (1.0, 1.0), (5.0, 5.0), (10.0, 10.0), (50.0, 30.0)];

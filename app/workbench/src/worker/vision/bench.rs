@@ -14,7 +14,7 @@ use handeye_geometry::targets::observation::{Corner, Corners};
 use handeye_server::{CellConfig, CellServer};
 use image::RgbImage;
 
-use super::super::{Clock, Connector, LiveConnector, Waker, Workers};
+use super::super::{Cell, Clock, RemoteCell, Waker, Workers};
 use super::{LatestSlot, Outlet, Tap, Vision, VisionSlots, VisionTask};
 use crate::capture::drawn::BOARD;
 use crate::capture::{CaptureRequest, Measured};
@@ -162,7 +162,7 @@ impl CellBench {
         let config = CellConfig { real_time: Some(real_time), ..CellConfig::new(scene) };
         let server = CellServer::start(config).expect("a cell");
         let source = CellSource::Address(server.endpoint());
-        let connector: Arc<dyn Connector> = Arc::new(LiveConnector::at(server.endpoint(), CellPaths::default()));
+        let connector: Arc<dyn Cell> = Arc::new(RemoteCell::at(server.endpoint(), CellPaths::default()));
         let (wake, woken) = bounded(1);
         let waker: Waker = Arc::new(move || {
             let _full = wake.try_send(()).is_err();

@@ -1,9 +1,8 @@
-//! A robot and a camera behind [drivers](handeye_driver), as the workers use them.
+//! A robot and a camera behind [drivers](handeye_driver).
 
 mod camera;
 mod control;
 mod motion;
-pub mod offered;
 #[cfg(test)]
 mod tests;
 
@@ -13,23 +12,23 @@ use handeye_coppeliasim::CancelToken;
 use handeye_driver::{BadSpec, DriverCell, DriverCellSpec, DriverError, DriverHost, DriverOptions, NoCell};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-use crate::model::Drivers;
-use crate::text::Text;
-use crate::worker::{CameraPort, Connected, Connector, ControlPort, MotionPort, PortError};
+use crate::Drivers;
+use crate::{CameraPort, Cell, Connected, ControlPort, MotionPort, PortError};
 use camera::DriverCamera;
 use control::DriverControl;
+use handeye_wording::Text;
 use handeye_wording::text;
 use motion::DriverMotion;
 
 /// Starts the drivers, or connects to them, once for all workers; and again when they have ended.
-pub struct DriverConnector {
+pub struct DrivenCell {
     drivers: Drivers,
     /// Or why these drivers are none.
     host: Result<DriverHost, BadSpec>,
     typed: TypedPose,
 }
 
-impl DriverConnector {
+impl DrivenCell {
     /// Nothing is started yet.
     pub fn new(drivers: Drivers) -> Self {
         let host = spec(&drivers).map(|spec| DriverHost::new(spec, DriverOptions::default()));
@@ -60,14 +59,14 @@ impl DriverConnector {
     }
 }
 
-impl Connector for DriverConnector {
-    fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+impl Cell for DrivenCell {
+    fn control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
         let cell = self.cell(shutdown)?;
         let port = DriverControl::new(cell.clone(), self.is_freehand().then(|| self.typed.clone()));
         Ok(self.connected(Box::new(port), &cell))
     }
 
-    fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+    fn camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
         let cell = self.cell(shutdown)?;
         if cell.camera().is_none() {
             let said =
@@ -78,7 +77,7 @@ impl Connector for DriverConnector {
         Ok(self.connected(Box::new(port), &cell))
     }
 
-    fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+    fn motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
         let cell = self.cell(shutdown)?;
         Ok(self.connected(Box::new(DriverMotion::new(cell.clone())), &cell))
     }

@@ -1,18 +1,19 @@
-//! What the workers need of a cell. The client of the remote API is one implementation, tests have another.
+//! What can be asked of a cell.
 
 use std::time::Duration;
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::CancelToken;
 use handeye_coppeliasim::cell::{BoardInView, FollowMoment, FollowWish};
+use handeye_driver::LogLevel;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::Robot;
 use image::RgbImage;
 
-use crate::model::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState, Severity};
-use crate::text::Text;
+use crate::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
+use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Why a port has no answer.
@@ -59,25 +60,25 @@ pub struct Connected<Port> {
     pub server: String,
 }
 
-/// Makes connections to a cell. Blocks; used on the threads of the workers only.
-pub trait Connector: Send + Sync {
+/// A cell, however it is reached. It makes connections, each for a thread of its own; all calls block.
+pub trait Cell: Send + Sync {
     /// A connection for joints, tip, simulation and stop.
     ///
     /// # Errors
     /// [`PortError`]; within a second after `shutdown` is raised.
-    fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError>;
+    fn control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError>;
 
     /// A connection for images.
     ///
     /// # Errors
-    /// As [`Self::connect_control`].
-    fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError>;
+    /// As [`Self::control`].
+    fn camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError>;
 
     /// A connection for motions.
     ///
     /// # Errors
-    /// As [`Self::connect_control`].
-    fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError>;
+    /// As [`Self::control`].
+    fn motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError>;
 
     /// The user wants no more tries: from now on a connection that is not there is [`PortError::Rests`], and a try under way is
     /// given up. Waits for nothing. Only where a try starts a program is there reason to.
@@ -147,7 +148,7 @@ pub trait ControlPort: Send {
     }
 
     /// What the cell has said for people since the last call.
-    fn heard(&mut self) -> Vec<(Severity, String)> {
+    fn heard(&mut self) -> Vec<(LogLevel, String)> {
         Vec::new()
     }
 }
@@ -266,7 +267,7 @@ pub struct RawFrame {
     pub joints_rad: JointValues,
     /// Where the board was at that instant, if the cell publishes it.
     pub base_from_target_true: Option<Pose<Base, Target>>,
-    /// See [`FrameInfo::clocks`](crate::model::FrameInfo::clocks).
+    /// How far \[s\] the robot's clock is ahead of the camera's, and how well that is known; where they are two.
     pub clocks: Option<[f64; 2]>,
 }
 

@@ -1,5 +1,8 @@
 //! Connections to a cell over the remote API; starts the built-in cell when it is the one to connect to.
 
+mod error;
+mod motion;
+
 use std::sync::{Mutex, PoisonError};
 
 use handeye_cell::scene::SceneChoice;
@@ -7,43 +10,46 @@ use handeye_coppeliasim::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_coppeliasim::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, SimulationState};
 use handeye_server::{CellConfig, CellServer};
 
-use super::cell_error::{check, check_arm, port_error};
-use super::port::{CameraPort, Connected, Connector, ControlPort, MotionPort, Newest, PortError, RawFrame};
-use crate::model::{BoardMotion, CellFacts, RobotState, Simulation};
-use crate::motion::live::LiveMotion;
+use error::{check, check_arm, port_error};
+use motion::RemoteMotion;
+pub use motion::end_of_following;
+pub(crate) use motion::{VIEWS_SEED, contact_text, no_views};
 
-/// Connects to the cell that the window was started for.
-pub struct LiveConnector {
-    cell: Cell,
+use crate::port::{CameraPort, Cell, Connected, ControlPort, MotionPort, Newest, PortError, RawFrame};
+use crate::{BoardMotion, CellFacts, RobotState, Simulation};
+
+/// A cell over the remote API: the built-in one, which it starts, or one that runs.
+pub struct RemoteCell {
+    cell: Server,
     /// Where it has its parts.
     paths: CellPaths,
     /// The built-in cell, once started. It ends with this connector.
     server: Mutex<Option<CellServer>>,
 }
 
-enum Cell {
+enum Server {
     /// Started by this program.
     BuiltIn(SceneChoice),
     /// There already.
     At(String),
 }
 
-impl LiveConnector {
+impl RemoteCell {
     /// To the built-in cell with a scene; it is started when it is first connected to.
     pub fn built_in(scene: SceneChoice) -> Self {
-        Self { cell: Cell::BuiltIn(scene), paths: CellPaths::default(), server: Mutex::new(None) }
+        Self { cell: Server::BuiltIn(scene), paths: CellPaths::default(), server: Mutex::new(None) }
     }
 
     /// To what runs at an address, and has its parts at `objects`.
     pub fn at(address: String, objects: CellPaths) -> Self {
-        Self { cell: Cell::At(address), paths: objects, server: Mutex::new(None) }
+        Self { cell: Server::At(address), paths: objects, server: Mutex::new(None) }
     }
 
     /// Where to connect to. Starts the built-in cell when that is needed; the other workers wait for the first.
     fn endpoint(&self) -> Result<Endpoint, PortError> {
         let address = match &self.cell {
-            Cell::At(address) => address.clone(),
-            Cell::BuiltIn(scene) => {
+            Server::At(address) => address.clone(),
+            Server::BuiltIn(scene) => {
                 let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
                 match server.as_ref() {
                     Some(server) => server.endpoint(),
@@ -62,8 +68,8 @@ impl LiveConnector {
     ) -> Result<Half, PortError> {
         let endpoint = self.endpoint()?;
         let usual = match &self.cell {
-            Cell::BuiltIn(_) => ConnectionOptions::own_cell(),
-            Cell::At(_) => ConnectionOptions::default(),
+            Server::BuiltIn(_) => ConnectionOptions::own_cell(),
+            Server::At(_) => ConnectionOptions::default(),
         };
         let options = ConnectionOptions { shutdown: shutdown.clone(), ..usual };
         let connected = half(&endpoint, &options, &self.paths);
@@ -87,7 +93,7 @@ impl LiveConnector {
     }
 
     fn describe(&self, info: &CellInfo) -> String {
-        if matches!(self.cell, Cell::BuiltIn(_)) {
+        if matches!(self.cell, Server::BuiltIn(_)) {
             return "built-in cell".to_owned();
         }
         if info.is_handeye_cell {
@@ -100,31 +106,31 @@ impl LiveConnector {
     }
 }
 
-impl Connector for LiveConnector {
-    fn connect_control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
+impl Cell for RemoteCell {
+    fn control(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn ControlPort>>, PortError> {
         let arm = self.connect(shutdown, Arm::connect)?;
         let info = arm.info().clone();
-        Ok(self.connected(Box::new(LiveControl { arm }), &info))
+        Ok(self.connected(Box::new(RemoteControl { arm }), &info))
     }
 
-    fn connect_camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
+    fn camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
         let feed = self.connect(shutdown, CameraFeed::connect)?;
         let info = feed.info().clone();
-        Ok(self.connected(Box::new(LiveCamera { feed }), &info))
+        Ok(self.connected(Box::new(RemoteCamera { feed }), &info))
     }
 
-    fn connect_motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
+    fn motion(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn MotionPort>>, PortError> {
         let arm = self.connect(shutdown, Arm::connect)?;
         let info = arm.info().clone();
-        Ok(self.connected(Box::new(LiveMotion::new(arm).map_err(port_error)?), &info))
+        Ok(self.connected(Box::new(RemoteMotion::new(arm).map_err(port_error)?), &info))
     }
 }
 
-struct LiveControl {
+struct RemoteControl {
     arm: Arm,
 }
 
-impl ControlPort for LiveControl {
+impl ControlPort for RemoteControl {
     fn facts(&mut self) -> Result<CellFacts, PortError> {
         let kinematics = self.arm.kinematics().map_err(port_error)?;
         let truth = match self.arm.ground_truth() {
@@ -175,11 +181,11 @@ impl ControlPort for LiveControl {
     }
 }
 
-struct LiveCamera {
+struct RemoteCamera {
     feed: CameraFeed,
 }
 
-impl CameraPort for LiveCamera {
+impl CameraPort for RemoteCamera {
     fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError> {
         check(self.feed.sim().connection())?;
         // Cheap to ask for, and images of a time that has been seen are not fetched again.

@@ -1,4 +1,4 @@
-//! The arm of a cell over the remote API, as the motion worker drives it.
+//! The arm of a cell over the remote API.
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::cell::{
@@ -10,18 +10,18 @@ use handeye_plan::guided::choose::Robot;
 use handeye_plan::{Contact, PlanError, Surroundings};
 use nalgebra::Vector3;
 
+use super::error::{check_arm, port_error};
 use crate::limits;
-use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
-use crate::text::Text;
-use crate::worker::cell_error::{check_arm, port_error};
-use crate::worker::port::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use crate::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
+use crate::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Seed of the views that are compared for a plan: the same question gets the same plan.
 pub(crate) const VIEWS_SEED: u64 = 1;
 
 /// A connection that moves the arm.
-pub(crate) struct LiveMotion {
+pub(crate) struct RemoteMotion {
     arm: Arm,
     kinematics: Result<ArmKinematics, UnknownKinematics>,
     /// What the cell says stands around, as it was when the connection was made.
@@ -32,7 +32,7 @@ pub(crate) struct LiveMotion {
     among: Option<Among>,
 }
 
-impl LiveMotion {
+impl RemoteMotion {
     /// Over an arm whose kinematics is looked at once.
     pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
         let kinematics = arm.kinematics()?;
@@ -128,7 +128,7 @@ impl LiveMotion {
     }
 }
 
-impl MotionPort for LiveMotion {
+impl MotionPort for RemoteMotion {
     fn check(&mut self) -> Result<(), PortError> {
         check_arm(&mut self.arm)
     }

@@ -15,11 +15,11 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::port_error;
 use crate::limits;
-use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
-use crate::motion::live::{VIEWS_SEED, contact_text, no_views};
-use crate::motion::rest::moved_text;
-use crate::text::Text;
-use crate::worker::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use crate::moved::moved_text;
+use crate::remote::{VIEWS_SEED, contact_text, no_views};
+use crate::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
+use crate::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Beyond its own length a step of the tip may be so far \[m\] from the straight way: the wrist turns about other axes than the

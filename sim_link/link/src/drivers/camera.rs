@@ -8,8 +8,8 @@ use handeye_driver::message::Ability;
 use handeye_driver::{DriverCell, NoPose, limits};
 
 use super::{TypedPose, port_error};
-use crate::text::Text;
-use crate::worker::{CameraPort, Newest, PortError, RawFrame};
+use crate::{CameraPort, Newest, PortError, RawFrame};
+use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Longest wait for an image in one call: the camera worker has other tasks, too.

@@ -14,9 +14,9 @@ use handeye_geometry::frames::Pose;
 use handeye_plan::{Obstacle, Surroundings};
 
 use super::*;
-use crate::model::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome, Moves, RobotState};
-use crate::text::Language;
-use crate::worker::{JogRequest, Newest, RawFrame};
+use crate::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome, Moves, RobotState};
+use crate::{JogRequest, Newest, RawFrame};
+use handeye_wording::English;
 
 /// Serves one part of a cell to everybody who connects; the address.
 fn served(part: FakePart) -> String {
@@ -41,8 +41,8 @@ fn served_without(part: FakePart, cannot: Vec<Ability>) -> String {
     address
 }
 
-fn connector(robot: Option<String>, camera: Option<String>) -> DriverConnector {
-    DriverConnector::new(Drivers { robot, camera })
+fn connector(robot: Option<String>, camera: Option<String>) -> DrivenCell {
+    DrivenCell::new(Drivers { robot, camera })
 }
 
 fn first_state(control: &mut dyn ControlPort) -> RobotState {
@@ -66,11 +66,11 @@ fn image(camera: &mut dyn CameraPort, seen_s: Option<f64>) -> RawFrame {
 fn a_cell_behind_a_driver_is_seen_read_and_moved_once_somebody_allows_it() {
     let connector = connector(Some(served(FakePart::Both)), None);
     let shutdown = CancelToken::default();
-    let mut control = connector.connect_control(&shutdown).expect("connected").port;
+    let mut control = connector.control(&shutdown).expect("connected").port;
     let facts = control.facts().expect("connected");
     assert_eq!((facts.joints.len(), facts.moves), (6, Moves::OnceArmed { joints: true, tip: true }));
     assert!(!facts.poses_are_typed && facts.truth.is_none());
-    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    let mut camera = connector.camera(&shutdown).expect("connected").port;
     // The first images may come before the clocks are related.
     let mut frame = image(camera.as_mut(), None);
     while frame.base_from_tip.is_none() {
@@ -80,7 +80,7 @@ fn a_cell_behind_a_driver_is_seen_read_and_moved_once_somebody_allows_it() {
     let later = image(camera.as_mut(), Some(frame.sim_time_s));
     assert!(later.sim_time_s > frame.sim_time_s);
 
-    let mut motion = connector.connect_motion(&shutdown).expect("connected").port;
+    let mut motion = connector.motion(&shutdown).expect("connected").port;
     let before = first_state(control.as_mut());
     assert!(!before.is_armed);
     let jog = Jog::Translate { frame: JogFrame::Base, axis: Axis::Z, forward: true };
@@ -114,8 +114,8 @@ fn known_arm(control: &mut dyn ControlPort) -> ArmKinematics {
 fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_of_boxes() {
     let connector = connector(Some(served(FakePart::Both)), None);
     let shutdown = CancelToken::default();
-    let mut control = connector.connect_control(&shutdown).expect("connected").port;
-    let mut motion = connector.connect_motion(&shutdown).expect("connected").port;
+    let mut control = connector.control(&shutdown).expect("connected").port;
+    let mut motion = connector.motion(&shutdown).expect("connected").port;
     let arm = known_arm(control.as_mut());
     let here = first_state(control.as_mut());
     assert!(arm.fits(&here.joints_rad, &here.base_from_tip));
@@ -133,7 +133,7 @@ fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_o
     for goal in [goal, MotionGoal::Tip(arm.tip(&there))] {
         let refused = motion.move_to(&goal, 0.5, &shutdown).expect("connected");
         let MotionOutcome::Refused(why) = &refused else { panic!("{refused:?}") };
-        assert!(why.say(Language::English).contains("wall"), "{why:?}");
+        assert!(why.say(English).contains("wall"), "{why:?}");
     }
     assert!(motion.keep_out(&Surroundings::default()).is_ok());
     assert_eq!(motion.move_to(&goal, 0.5, &shutdown), Ok(MotionOutcome::Arrived));
@@ -144,8 +144,8 @@ fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_o
 fn an_arm_that_takes_joint_values_alone_is_jogged_along_axes_and_goes_to_poses_by_its_chain() {
     let connector = connector(Some(served_without(FakePart::Robot, vec![Ability::MoveTip])), None);
     let shutdown = CancelToken::default();
-    let mut control = connector.connect_control(&shutdown).expect("connected").port;
-    let mut motion = connector.connect_motion(&shutdown).expect("connected").port;
+    let mut control = connector.control(&shutdown).expect("connected").port;
+    let mut motion = connector.motion(&shutdown).expect("connected").port;
     assert_eq!(control.facts().expect("connected").moves, Moves::OnceArmed { joints: true, tip: false });
     known_arm(control.as_mut());
     let before = first_state(control.as_mut()).base_from_tip;
@@ -164,10 +164,7 @@ fn an_arm_that_takes_joint_values_alone_is_jogged_along_axes_and_goes_to_poses_b
     assert!(off_m < 2e-4 && off_rad < 1e-3, "{off_m} m, {off_rad} rad");
     let far = Pose::from_translation_xyzw([9.0, 0.0, 0.3], [0.0, 1.0, 0.0, 0.0]);
     let refused = motion.move_to(&MotionGoal::Tip(far), 0.5, &shutdown).expect("connected");
-    assert!(
-        matches!(&refused, MotionOutcome::Refused(why) if why.say(Language::English).contains("reach")),
-        "{refused:?}"
-    );
+    assert!(matches!(&refused, MotionOutcome::Refused(why) if why.say(English).contains("reach")), "{refused:?}");
 }
 
 /// A driver in a few lines: it greets, answers pings, and sends images where it has some, and no states.
@@ -204,7 +201,7 @@ fn scripted(has_images: bool) -> String {
 fn a_slow_camera_has_not_answered_yet() {
     let shutdown = CancelToken::default();
     let connector = connector(Some(scripted(false)), None);
-    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    let mut camera = connector.camera(&shutdown).expect("connected").port;
     assert_eq!(camera.newest(None), Ok(Newest::Awaited));
 }
 
@@ -212,10 +209,10 @@ fn a_slow_camera_has_not_answered_yet() {
 fn an_image_without_a_state_around_it_says_what_its_driver_owes_and_not_what_a_pendant_shows() {
     let shutdown = CancelToken::default();
     let connector = connector(Some(scripted(true)), None);
-    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    let mut camera = connector.camera(&shutdown).expect("connected").port;
     let frame = image(camera.as_mut(), None);
     assert_eq!(frame.base_from_tip, None);
-    let why = frame.no_pose.expect("a reason").say(Language::English);
+    let why = frame.no_pose.expect("a reason").say(English);
     assert!(why.contains("has not sent a state") && !why.contains("pendant"), "{why}");
 }
 
@@ -223,14 +220,14 @@ fn an_image_without_a_state_around_it_says_what_its_driver_owes_and_not_what_a_p
 fn freehand_a_person_types_where_the_robot_is() {
     let connector = connector(None, Some(served(FakePart::Camera)));
     let shutdown = CancelToken::default();
-    let mut control = connector.connect_control(&shutdown).expect("connected").port;
+    let mut control = connector.control(&shutdown).expect("connected").port;
     let facts = control.facts().expect("connected");
     assert!(facts.poses_are_typed && facts.joints.is_empty() && facts.moves == Moves::Never);
     assert_eq!(control.state(), Ok(None));
-    let mut camera = connector.connect_camera(&shutdown).expect("connected").port;
+    let mut camera = connector.camera(&shutdown).expect("connected").port;
     let frame = image(camera.as_mut(), None);
     assert_eq!(frame.base_from_tip, None, "nobody has said where the robot is");
-    assert!(frame.no_pose.is_some_and(|why| why.say(Language::English).contains("pendant")));
+    assert!(frame.no_pose.is_some_and(|why| why.say(English).contains("pendant")));
     let pose = Pose::from_translation_xyzw([0.4, -0.1, 0.3], [0.0, 1.0, 0.0, 0.0]);
     control.type_pose(Some(pose)).expect("taken");
     assert_eq!(control.state().expect("connected").map(|state| state.base_from_tip), Some(pose));
@@ -243,15 +240,15 @@ fn freehand_a_person_types_where_the_robot_is() {
 fn a_driver_without_images_says_what_is_missing_and_one_that_is_not_there_is_tried_again() {
     let shutdown = CancelToken::default();
     let robot_alone = connector(Some(served(FakePart::Robot)), None);
-    assert!(matches!(robot_alone.connect_camera(&shutdown), Err(PortError::Hopeless(_))));
+    assert!(matches!(robot_alone.camera(&shutdown), Err(PortError::Hopeless(_))));
     let free = TcpListener::bind("127.0.0.1:0").expect("a free port").local_addr().expect("bound");
     let nobody = connector(Some(format!("tcp://{free}")), None);
-    assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Later { .. })));
+    assert!(matches!(nobody.control(&shutdown), Err(PortError::Later { .. })));
     nobody.rest();
-    let Err(PortError::Rests(why)) = nobody.connect_control(&shutdown) else { panic!("it is tried on") };
-    assert!(why.say(Language::English).contains("no driver listens"), "{why:?}");
+    let Err(PortError::Rests(why)) = nobody.control(&shutdown) else { panic!("it is tried on") };
+    assert!(why.say(English).contains("no driver listens"), "{why:?}");
     nobody.again();
-    assert!(matches!(nobody.connect_control(&shutdown), Err(PortError::Later { .. })));
+    assert!(matches!(nobody.control(&shutdown), Err(PortError::Later { .. })));
     let no_program = connector(Some("no-such-program-anywhere --x".to_owned()), None);
-    assert!(matches!(no_program.connect_control(&shutdown), Err(PortError::Hopeless(_))));
+    assert!(matches!(no_program.control(&shutdown), Err(PortError::Hopeless(_))));
 }

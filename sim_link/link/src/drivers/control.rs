@@ -7,8 +7,8 @@ use handeye_driver::{ChainPlacement, Driver, DriverCell, LogLevel};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::{TypedPose, port_error};
-use crate::model::{ArmDoubt, BoardMotion, CellFacts, JointFacts, Moves, RobotState, Severity, Simulation};
-use crate::worker::{ControlPort, PortError};
+use crate::{ArmDoubt, BoardMotion, CellFacts, JointFacts, Moves, RobotState, Simulation};
+use crate::{ControlPort, PortError};
 use handeye_wording::text;
 
 pub(super) struct DriverControl {
@@ -121,19 +121,12 @@ impl ControlPort for DriverControl {
         Ok(())
     }
 
-    fn heard(&mut self) -> Vec<(Severity, String)> {
+    fn heard(&mut self) -> Vec<(LogLevel, String)> {
         let camera = self.cell.camera().filter(|_| self.cell.is_two());
         let drivers = std::iter::once(self.cell.robot()).chain(camera);
         let lines = drivers.flat_map(|driver| {
             let name = driver.hello().name.clone();
-            driver.take_log().into_iter().filter(|line| line.level != LogLevel::Debug).map(move |line| {
-                let severity = match line.level {
-                    LogLevel::Error => Severity::Error,
-                    LogLevel::Warn => Severity::Warning,
-                    LogLevel::Info | LogLevel::Debug => Severity::Info,
-                };
-                (severity, format!("{name}: {}", line.text))
-            })
+            driver.take_log().into_iter().map(move |line| (line.level, format!("{name}: {}", line.text)))
         });
         lines.collect()
     }

@@ -1,0 +1,121 @@
+//! Where an arm is asked to go, and what came of it.
+
+use handeye_arm::{JointKind, JointValues};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_wording::Text;
+use serde::{Deserialize, Serialize};
+
+/// Where to move.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum MotionGoal {
+    /// These joint positions \[rad, or m of a prismatic joint\].
+    Joints(JointValues),
+    /// This pose of the tip.
+    Tip(Pose<Base, Tip>),
+}
+
+/// How a motion ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum MotionOutcome {
+    /// The arm is there and at rest.
+    Arrived,
+    /// It was not begun, and this is why.
+    Refused(Text),
+    /// It was stopped on its way.
+    Stopped,
+    /// It was begun and did not get there.
+    Failed(Text),
+}
+
+impl MotionOutcome {
+    /// Why the arm is not at its goal, where there is a reason to say.
+    pub fn why(&self) -> Option<&Text> {
+        match self {
+            Self::Refused(why) | Self::Failed(why) => Some(why),
+            Self::Arrived | Self::Stopped => None,
+        }
+    }
+}
+
+/// Axes of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Axis {
+    /// First.
+    X,
+    /// Second.
+    Y,
+    /// Third.
+    Z,
+}
+
+impl Axis {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+}
+
+/// Along which axes the tip is jogged.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum JogFrame {
+    /// Those of the robot's base.
+    #[default]
+    Base,
+    /// Those of the tip.
+    Tip,
+    /// Those of the camera, by the current calibration or else by what the cell says of it; turns are about its centre.
+    Camera,
+}
+
+/// One direction of jogging; `forward` tells the two ways apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Jog {
+    /// One joint, counted from 0 at the base.
+    Joint {
+        /// Which.
+        index: usize,
+        /// Towards larger values.
+        forward: bool,
+    },
+    /// The tip, along an axis.
+    Translate {
+        /// Whose axis.
+        frame: JogFrame,
+        /// Which axis.
+        axis: Axis,
+        /// Which way.
+        forward: bool,
+    },
+    /// The tip, about an axis; right-handed when forward.
+    Rotate {
+        /// Whose axis.
+        frame: JogFrame,
+        /// Which axis.
+        axis: Axis,
+        /// Which way.
+        forward: bool,
+    },
+}
+
+impl Jog {
+    /// Whether it goes along something, in metres, and not about it, in radians; `kind` says how a joint moves.
+    pub fn is_length(&self, kind: impl Fn(usize) -> JointKind) -> bool {
+        match *self {
+            Self::Translate { .. } => true,
+            Self::Rotate { .. } => false,
+            Self::Joint { index, .. } => kind(index) == JointKind::Prismatic,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_of_a_prismatic_joint_is_a_length_and_one_of_a_revolute_joint_an_angle() {
+        let kind = |joint: usize| if joint == 1 { JointKind::Prismatic } else { JointKind::Revolute };
+        let is_length = |jog: Jog| jog.is_length(kind);
+        let (frame, axis, forward) = (JogFrame::Base, Axis::X, true);
+        assert!(is_length(Jog::Joint { index: 1, forward }) && is_length(Jog::Translate { frame, axis, forward }));
+        assert!(!is_length(Jog::Joint { index: 0, forward }) && !is_length(Jog::Rotate { frame, axis, forward }));
+    }
+}

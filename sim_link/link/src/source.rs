@@ -1,0 +1,61 @@
+//! Which cell is worked with.
+
+use std::fmt;
+use std::sync::Arc;
+
+use handeye_cell::scene::SceneChoice;
+use handeye_coppeliasim::cell::CellPaths;
+use serde::{Deserialize, Serialize};
+
+use crate::{Cell, DrivenCell, RemoteCell};
+
+/// Which cell is worked with.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CellSource {
+    /// The cell inside this program, started by it, with this scene.
+    BuiltIn(SceneChoice),
+    /// A server that runs already.
+    Address(String),
+    /// Programs that speak the driver protocol.
+    Drivers(Drivers),
+}
+
+impl CellSource {
+    /// The cell; `objects` is where another scene than the built-in one has its parts. Nothing is started or connected to yet.
+    pub fn cell(&self, objects: &CellPaths) -> Arc<dyn Cell> {
+        match self {
+            Self::Drivers(drivers) => Arc::new(DrivenCell::new(drivers.clone())),
+            Self::Address(address) => Arc::new(RemoteCell::at(address.clone(), objects.clone())),
+            Self::BuiltIn(scene) => Arc::new(RemoteCell::built_in(scene.clone())),
+        }
+    }
+
+    /// Whether it is the cell inside this program, of any scene.
+    pub fn is_built_in(&self) -> bool {
+        matches!(self, Self::BuiltIn(_))
+    }
+}
+
+impl Default for CellSource {
+    fn default() -> Self {
+        Self::BuiltIn(SceneChoice::default())
+    }
+}
+
+/// Commands or addresses of drivers. Without one for the robot a person types its poses.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Drivers {
+    /// The robot's, which may have the images, too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
+    /// The camera's, where it is another program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+}
+
+impl fmt::Display for Drivers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named: Vec<&str> = self.robot.iter().chain(&self.camera).map(String::as_str).collect();
+        f.write_str(&named.join(" + "))
+    }
+}
