@@ -9,6 +9,7 @@ mod auto;
 mod box_arg;
 mod calibrate;
 mod cell;
+mod cell_choice;
 mod doctor;
 pub(crate) mod driver;
 mod export;
@@ -20,6 +21,7 @@ mod import;
 mod late;
 #[cfg(test)]
 mod offered_tests;
+mod open_cell;
 mod out;
 mod output;
 mod plan;

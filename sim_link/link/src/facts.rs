@@ -1,7 +1,7 @@
 //! What a cell says of itself and of its robot.
 
 use handeye_arm::{JointKind, JointValues};
-use handeye_coppeliasim::cell::{ArmKinematics, BoardPath, CellInfo, CellJoint, GroundTruth};
+use handeye_coppeliasim::cell::{ArmKinematics, CellInfo, CellJoint, GroundTruth};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use serde::{Deserialize, Serialize};
@@ -134,13 +134,4 @@ pub struct RobotState {
     pub simulation: Simulation,
     /// Whether a robot behind a driver may be moved.
     pub is_armed: bool,
-}
-
-/// How a simulated cell moves its board.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct BoardMotion {
-    /// Along which path.
-    pub path: BoardPath,
-    /// How fast [m/s].
-    pub speed_m_s: f64,
 }

@@ -21,17 +21,21 @@ pub enum MotionOutcome {
     Arrived,
     /// It was not begun, and this is why.
     Refused(Text),
+    /// The arm stands, and not at its goal, which may be out of reach.
+    Unreached(Text),
     /// It was stopped on its way.
     Stopped,
     /// It was begun and did not get there.
     Failed(Text),
+    /// The same, because another client holds the simulation.
+    Held(Text),
 }
 
 impl MotionOutcome {
     /// Why the arm is not at its goal, where there is a reason to say.
     pub fn why(&self) -> Option<&Text> {
         match self {
-            Self::Refused(why) | Self::Failed(why) => Some(why),
+            Self::Refused(why) | Self::Unreached(why) | Self::Failed(why) | Self::Held(why) => Some(why),
             Self::Arrived | Self::Stopped => None,
         }
     }

@@ -34,7 +34,7 @@ mod remote;
 mod source;
 
 pub use drivers::DrivenCell;
-pub use facts::{ArmDoubt, BoardMotion, CellFacts, JointFacts, Moves, RobotState, Simulation, Truth};
+pub use facts::{ArmDoubt, CellFacts, JointFacts, Moves, RobotState, Simulation, Truth};
 pub use goal::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 pub use moved::moved_text;
 pub use port::{

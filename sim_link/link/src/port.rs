@@ -4,15 +4,17 @@ use std::time::Duration;
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{BoardInView, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{BoardInView, BoardMotion, FollowEnd, FollowMoment, FollowWish};
+use handeye_dataset::taught_poses::MotionLimits;
 use handeye_driver::LogLevel;
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::TargetSpec;
 use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::Robot;
 use image::RgbImage;
 
-use crate::{BoardMotion, CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
+use crate::{CellFacts, Jog, MotionGoal, MotionOutcome, RobotState};
 use handeye_wording::Text;
 use handeye_wording::text;
 
@@ -24,6 +26,8 @@ pub enum PortError {
     Lost(Text),
     /// The cell answered no.
     Refused(Text),
+    /// The simulation stands still because another client holds it.
+    Held(Text),
     /// It cannot work before the user changes something.
     Hopeless(Text),
     /// As [`Self::Lost`], where the cell itself is not to be tried more often than this.
@@ -43,9 +47,12 @@ impl PortError {
     /// Why, for the screen.
     pub fn why(&self) -> &Text {
         match self {
-            Self::Lost(why) | Self::Refused(why) | Self::Hopeless(why) | Self::Later { why, .. } | Self::Rests(why) => {
-                why
-            }
+            Self::Lost(why)
+            | Self::Refused(why)
+            | Self::Held(why)
+            | Self::Hopeless(why)
+            | Self::Later { why, .. }
+            | Self::Rests(why) => why,
         }
     }
 }
@@ -113,6 +120,22 @@ pub trait ControlPort: Send {
     /// [`PortError`].
     fn start_simulation(&mut self) -> Result<(), PortError>;
 
+    /// Ends the simulation, and waits until it has ended. Nothing where there is none.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn stop_simulation(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
+
+    /// Where the scene of a simulation has its board; `None` where that is not known.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn base_from_board(&mut self, _target: &TargetSpec) -> Result<Option<Pose<Base, Target>>, PortError> {
+        Ok(None)
+    }
+
     /// Has every joint stay where it is.
     ///
     /// # Errors
@@ -173,6 +196,8 @@ pub struct ViewsRequest {
     pub taken: Vec<Pose<Base, Tip>>,
     /// How many are wanted; there may be fewer.
     pub count: usize,
+    /// Of the views that are compared: the same question gets the same answer.
+    pub seed: u64,
 }
 
 /// Whether an arm can go along with a board from where it is.
@@ -188,6 +213,26 @@ pub enum Room {
 
 /// What moves the arm.
 pub trait MotionPort: Send {
+    /// From now on simulated time advances by [`Self::pass`] and the motions of this connection alone, or by itself again.
+    /// Time that is not simulated goes on.
+    ///
+    /// # Errors
+    /// [`PortError`].
+    fn step_by_step(&mut self, _on: bool) -> Result<(), PortError> {
+        Ok(())
+    }
+
+    /// Lets simulated time advance to the next pass. Nothing where it is not simulated.
+    ///
+    /// # Errors
+    /// [`PortError`], [`PortError::Held`] among them.
+    fn pass(&mut self, _cancel: &CancelToken) -> Result<(), PortError> {
+        Ok(())
+    }
+
+    /// The fastest that a simulated arm moves from now on; a robot behind a driver has limits of its own.
+    fn limit(&mut self, _limits: &MotionLimits) {}
+
     /// Looks whether the cell is there, without asking it for anything.
     ///
     /// # Errors
@@ -240,12 +285,15 @@ pub trait MotionPort: Send {
     /// The reason, where the kinematics is not known.
     fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text>;
 
-    /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: [`MotionOutcome::Stopped`] when
-    /// that was wished or a stop came, and why otherwise.
+    /// Leads the tip where `wish` wants it, pass by pass, and returns when the arm stands: how that ended, or why it was not
+    /// begun or failed.
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError>;
+    fn follow(
+        &mut self,
+        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+    ) -> Result<Result<FollowEnd, MotionOutcome>, PortError>;
 }
 
 /// Images as they come from the cell.

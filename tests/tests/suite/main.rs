@@ -27,6 +27,7 @@ mod slow {
     mod coppeliasim_only;
     mod coppeliasim_scene;
     mod driven_cells;
+    mod driven_commands;
     mod drivers;
     mod first_user;
     mod following;

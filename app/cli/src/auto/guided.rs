@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_dataset::taught_poses::Goal;
 use handeye_estimate::diagnose::{Calibration, calibrate};
 use handeye_estimate::{Method, Observations};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::Sight;
-use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::{Proposal, Robot};
 use handeye_plan::guided::{Ending, Guide, Known, Next};
 use handeye_session::CaptureId;
@@ -16,7 +14,6 @@ use handeye_session::CaptureId;
 use super::super::Failure;
 use super::super::towards_board::TowardsBoard;
 use super::sequence::PoseSequence;
-use handeye_link::limits;
 use handeye_workbench::model::CapturePurpose;
 use handeye_workbench::text::Language;
 
@@ -26,10 +23,6 @@ pub struct GuidedSequence<'a, 's> {
     pub sequence: &'a mut PoseSequence<'s>,
     /// What chooses the poses.
     pub guide: &'a mut Guide,
-    /// The chain of the arm.
-    pub kinematics: &'a ArmKinematics,
-    /// What stands around, besides the board.
-    pub around: Surroundings,
     /// Captures that check the answer afterwards.
     pub checks: usize,
     /// Where to go if the board is not in view from where the arm stands, one after the other.
@@ -48,16 +41,12 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     pub fn new(
         sequence: &'a mut PoseSequence<'s>,
         guide: &'a mut Guide,
-        kinematics: &'a ArmKinematics,
-        around: Surroundings,
         checks: usize,
         towards_board: Vec<TowardsBoard>,
     ) -> Self {
         Self {
             sequence,
             guide,
-            kinematics,
-            around,
             checks,
             towards_board,
             sights: BTreeMap::new(),
@@ -70,8 +59,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     /// From the board in view to the end of the session, and the captures that check it.
     pub fn run(&mut self) -> Result<Ending, Failure> {
         self.sequence.begin()?;
-        let here = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
-        if !self.visit(&Goal::Joints(here.to_vec()), CapturePurpose::Calibrate)? && !self.look_for_board()? {
+        if !self.visit(None, CapturePurpose::Calibrate)? && !self.look_for_board()? {
             return Err(Failure::failed(anyhow::anyhow!(
                 "the board is not captured from where the arm stands: bring the whole board into the image and begin again"
             )));
@@ -93,7 +81,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
                 }
             };
             let goal = joints(plan.proposals.first())?;
-            if self.visit(&goal, CapturePurpose::Calibrate)? {
+            if self.visit(Some(&goal), CapturePurpose::Calibrate)? {
                 self.guide.captured();
             } else {
                 self.guide.failed();
@@ -109,11 +97,9 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     /// Goes to where the board should be in view, on ways that are known to be free; whether it was captured there.
     fn look_for_board(&mut self) -> Result<bool, Failure> {
         let goals = std::mem::take(&mut self.towards_board);
-        let among = self.kinematics.among(self.around.clone(), None);
-        self.sequence.cell.arm().keep_clear(Some(among));
-        for TowardsBoard { name, joints } in goals {
+        for TowardsBoard { name, goal } in goals {
             tracing::info!("the board is not in view here: the arm goes to {name}");
-            if self.visit(&Goal::Joints(joints.to_vec()), CapturePurpose::Calibrate)? {
+            if self.visit(Some(&goal), CapturePurpose::Calibrate)? {
                 return Ok(true);
             }
         }
@@ -129,7 +115,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
                 tracing::warn!("there is no further view in reach to check the answer at");
                 break;
             };
-            self.visit(&joints(Some(&proposal))?, CapturePurpose::Verify)?;
+            self.visit(Some(&joints(Some(&proposal))?), CapturePurpose::Verify)?;
         }
         Ok(())
     }
@@ -148,8 +134,8 @@ impl<'a, 's> GuidedSequence<'a, 's> {
         }
     }
 
-    /// Whether it gave a capture.
-    fn visit(&mut self, goal: &Goal, purpose: CapturePurpose) -> Result<bool, Failure> {
+    /// Whether it gave a capture, there or where the arm stands.
+    fn visit(&mut self, goal: Option<&Goal>, purpose: CapturePurpose) -> Result<bool, Failure> {
         self.number += 1;
         let name = match purpose {
             CapturePurpose::Calibrate => format!("guided {}", self.number),
@@ -182,9 +168,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     }
 
     fn robot(&mut self) -> Result<Robot, Failure> {
-        let joints = self.sequence.cell.arm().joint_values().map_err(Failure::failed)?;
-        let pace = limits::pace(&self.sequence.plan.limits, 1.0);
-        Ok(self.kinematics.guided_robot(&joints, pace, &self.around))
+        self.sequence.cell.robot()?
     }
 }
 

@@ -8,26 +8,29 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use handeye_coppeliasim::cell::{Arm, ArmKinematics, CellClient, CellPaths};
-use handeye_coppeliasim::{ConnectionOptions, Endpoint, SimulationState};
+use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_dataset::taught_poses::Goal;
+use handeye_estimate::handeye::Mode;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_estimate::{Method, Options};
+use handeye_geometry::targets::TargetSpec;
 use handeye_plan::Surroundings;
 use handeye_plan::guided::{CHECKS, Guide, GuidedOptions};
 use handeye_result::guided_record::GUIDED_RECORD;
-use handeye_server::{CellConfig, CellServer};
+use handeye_server::CellConfig;
 use handeye_session::guided::guided_record;
 use handeye_session::{FolderLock, Session, SessionMeta, Store};
 
-use super::cell::SceneArg;
 use super::output::Output;
-use crate::auto::sequence::PoseSequence;
+use crate::auto::sequence::{Images, PoseSequence};
+use crate::cell_choice::CellChoice;
+use crate::open_cell::OpenCell;
 use crate::rerun_arg;
 use crate::towards_board::TowardsBoard;
-use crate::{Failure, ObjectArgs, RerunArg, arm_arg, box_arg, out, record, solve};
+use crate::{Failure, RerunArg, arm_arg, box_arg, out, record, solve};
 use guided::GuidedSequence;
-use handeye_workbench::arguments::heading;
-use handeye_workbench::model::{CaptureOptions, Goal, Step, Truth};
+use handeye_workbench::arguments::{self, heading};
+use handeye_workbench::model::{self, CaptureOptions, Simulation, Step};
 use handeye_workbench::rerun_log::{Entry, Pace, RerunChoice};
 use handeye_workbench::session::start;
 use handeye_workbench::text::Language;
@@ -38,11 +41,8 @@ use solve::Solution;
 /// Options of `handeye auto`.
 #[derive(Debug, Args)]
 pub struct AutoArgs {
-    /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
-    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
-    connect: Option<String>,
     #[command(flatten)]
-    objects: ObjectArgs,
+    cell: CellChoice,
     /// `seed10` (the ten reference poses), a pose file, `auto` (planned views of the board), or `guided` (each pose chosen
     /// by what the captures so far leave open, until the goal is reached). `seed10` if not given, and `guided` with an option
     /// of guided capture.
@@ -64,11 +64,14 @@ pub struct AutoArgs {
     /// Write the result as JSON to this file too; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
-    #[command(flatten)]
-    scene: SceneArg,
-    /// Seed of everything random in the built-in cell, and of planned poses.
-    #[arg(long, value_name = "N", help_heading = heading::CELL)]
-    seed: Option<u64>,
+    /// The board on a real cell, which the built-in one and the public scene have as 10x7x15: inner corners and square in mm, or
+    /// kind=charuco,columns=… with the options of `handeye target`.
+    #[arg(long, value_name = "TEXT", help_heading = heading::TARGET)]
+    target: Option<String>,
+    /// Whether the camera is on the arm (eye_in_hand) or beside it, with the board on the arm (eye_to_hand); eye_in_hand if not
+    /// given.
+    #[arg(long, value_name = "MODE", value_parser = mode, help_heading = heading::CELL)]
+    mode: Option<Mode>,
     /// Run the built-in cell like real time instead of as fast as it can.
     #[arg(long, help_heading = heading::CELL)]
     real_time: bool,
@@ -101,6 +104,14 @@ struct GuidedArgs {
     /// the worst point of it; without it for where the camera saw the board.
     #[arg(long = "box", value_name = "X,Y,Z,DX,DY,DZ", value_parser = box_arg::tool_box, allow_hyphen_values = true, help_heading = heading::GUIDED)]
     tool_box: Option<TipBox>,
+}
+
+fn mode(text: &str) -> Result<Mode, String> {
+    match text {
+        "eye_in_hand" => Ok(Mode::EyeInHand),
+        "eye_to_hand" => Ok(Mode::EyeToHand),
+        _ => Err("eye_in_hand or eye_to_hand is needed".to_owned()),
+    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -137,95 +148,74 @@ impl GuidedArgs {
 /// At the end of its help.
 pub const EXAMPLES: &str = "Examples:
   handeye auto --poses seed10 --out session --json result.json
-  handeye auto --poses guided --goal 0.3 --scene panda --out guided";
+  handeye auto --poses guided --goal 0.3 --scene panda --out guided
+
+On a real cell, first to see what it would do:
+  handeye auto --driver \"python3 my_robot.py\" --camera-driver \"handeye driver v4l\" \\
+    --target 9x6x25 --poses poses.toml --dry-run
+Then with --allow-motion in place of --dry-run.";
 
 pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
-    if args.connect.is_some() && args.scene.is_given() {
-        return Err(Failure::unusable(anyhow::anyhow!(
-            "--scene describes the built-in cell and --connect takes another: give one of them"
-        )));
-    }
+    let scene = args.cell.scene()?;
     let by_default = if args.guided.given().is_some() { GUIDED } else { REFERENCE };
     let poses = args.poses.as_deref().unwrap_or(by_default);
     let is_guided = poses == GUIDED;
     if let Some(option) = args.guided.given().filter(|_| !is_guided) {
         return Err(Failure::unusable(anyhow::anyhow!("{option} goes with --poses guided")));
     }
-    let scene = args.scene.load()?;
-    let plans_here = args.connect.is_some() && poses == PLANNED;
-    let mut plan = match args.connect {
-        Some(_) if is_guided || plans_here => Plan::from_here(),
-        _ => Plan::find(poses, &scene, args.seed)?,
+    let target = target_of(args)?;
+    let plans_here = args.cell.is_given() && poses == PLANNED;
+    let mut plan = if plans_here || is_guided && args.cell.is_given() {
+        Plan::from_here()
+    } else {
+        Plan::find(poses, &scene, args.cell.seed)?
     };
     // Read before anything moves.
     let keep_out = args.keep_out.as_deref().map(Surroundings::read).transpose().map_err(Failure::unusable)?;
-    let seed = args.seed.unwrap_or(scene.seed);
+    let seed = args.cell.seed.unwrap_or(scene.seed);
     let recorder = rerun_arg::start(&args.rerun, RerunChoice::Record, Pace::Everything, true)?;
-    let paths = if args.connect.is_some() { CellPaths::default() } else { CellPaths::below(&scene.robot.name) };
-    let server = match args.connect {
-        Some(_) => None,
-        None => Some(
-            CellServer::start(CellConfig {
-                seed: args.seed,
-                real_time: Some(args.real_time),
-                ..CellConfig::new(scene)
-            })
-            .map_err(Failure::failed)?,
-        ),
-    };
-    let address = match (&args.connect, &server) {
-        (Some(address), _) => address.clone(),
-        (None, Some(server)) => server.endpoint(),
-        (None, None) => String::new(),
-    };
-    let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
-    let paths = args.objects.paths(paths);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sessions").join(timestamp()));
-    let options = if server.is_some() { ConnectionOptions::own_cell() } else { ConnectionOptions::default() };
-    let mut cell = CellClient::connect(&endpoint, &options, &paths).map_err(Failure::failed)?;
-    plan.check_joints(cell.info().joints.len())?;
-    let truth = cell.camera().ground_truth().map_err(Failure::failed)?;
-    let ran_before = cell.arm().sim().get_simulation_state().map_err(Failure::failed)? != SimulationState::Stopped;
-
-    keep_earlier_session(&folder)?;
-    // That it is another arm is no fault: its joint angles are then kept and not used.
-    let kinematics = cell.arm().kinematics().map_err(Failure::failed)?;
-    if let (true, Err(unknown)) = (is_guided, &kinematics) {
+    let own = CellConfig { seed: args.cell.seed, real_time: Some(args.real_time), ..CellConfig::new(scene) };
+    let mut cell = OpenCell::connect(&args.cell, own, &cancel)?;
+    plan.check_joints(cell.facts.joints.len())?;
+    cell.limit(plan.limits);
+    let ran_before = cell.robot_state()?.simulation != Simulation::Stopped;
+    if let Some(keep_out) = keep_out {
+        cell.keep_out(keep_out)?;
+    }
+    // That the chain is not known is no fault: joint angles are then kept and not used.
+    if let (true, Err(unknown)) = (is_guided, cell.robot()?) {
         return Err(Failure::failed(anyhow::anyhow!(
             "guided capture takes an arm whose chain is known: {unknown}; give the poses by a file, --poses FILE"
         )));
     }
     let kinematics = match &args.arm {
-        None => kinematics.ok(),
-        Some(named) => {
-            let read = kinematics.map_err(|unknown| {
-                Failure::failed(anyhow::anyhow!("--arm {named} cannot be checked against the robot: {unknown}"))
-            })?;
-            let here = cell.arm().joint_values().map_err(Failure::failed)?;
-            Some(arm_arg::checked(named, &read, &here)?)
-        }
+        None => cell.kinematics().cloned(),
+        Some(named) => Some(named_arm(named, &mut cell)?),
     };
-    let around = surroundings(cell.arm(), kinematics.as_ref(), is_guided || plans_here, keep_out)?;
     if plans_here {
-        plan = Plan::planned_here(cell.arm(), kinematics.as_ref(), &truth, &around, seed)?;
+        plan = Plan::planned_here(&mut cell, seed)?;
     }
-    let towards_board = match &kinematics {
-        Some(kinematics) if is_guided && args.connect.is_some() => {
-            TowardsBoard::all(cell.arm(), kinematics, &truth, &around)?
-        }
-        _ => Vec::new(),
-    };
+    let towards_board = if is_guided && args.cell.is_given() { TowardsBoard::all(&mut cell)? } else { Vec::new() };
+    if args.cell.dry_run {
+        return print_plan(&mut cell, &plan, is_guided);
+    }
+    cell.allow_motion(args.cell.allow_motion)?;
+    keep_earlier_session(&folder)?;
+    let truth = cell.facts.truth.clone();
     let meta = SessionMeta {
-        seeds: args.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
+        seeds: args.cell.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
         arm: start::arm(kinematics.as_ref()),
-        joint_kinds: start::joint_kinds(cell.info().joint_kinds()),
-        ..start::meta(Some(&Truth::from(&truth)), timestamp_rfc3339())
+        joint_kinds: start::joint_kinds(cell.facts.joints.iter().map(|joint| joint.kind)),
+        target,
+        mode: args.mode.unwrap_or(Mode::EyeInHand),
+        ..start::meta(truth.as_ref(), timestamp_rfc3339())
     };
     let mut session = Store::create(&folder, meta).map_err(Failure::failed)?;
     recorder.note(Entry::Step(Step::Capture));
     record::document(&recorder, &session);
-    record::cell(&recorder, cell.arm(), &truth).map_err(Failure::failed)?;
+    record::cell(&recorder, &cell.facts);
     let mut sequence = PoseSequence {
         cell: &mut cell,
         plan: &plan,
@@ -235,23 +225,18 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         recorder: &recorder,
         cancel: &cancel,
         began: Instant::now(),
-        images: 0,
+        images: Images::default(),
     };
     let mut guide = is_guided.then(|| Guide::new(args.guided.options(seed)));
-    let captured = match (&mut guide, &kinematics) {
-        (Some(guide), Some(kinematics)) => {
+    let captured = match &mut guide {
+        Some(guide) => {
             let checks = args.guided.check_poses.map_or(CHECKS, |poses| poses as usize);
-            GuidedSequence::new(&mut sequence, guide, kinematics, around, checks, towards_board).run().map(Some)
+            GuidedSequence::new(&mut sequence, guide, checks, towards_board).run().map(Some)
         }
-        _ => sequence.run().map(|()| None),
+        None => sequence.run().map(|()| None),
     };
-    // Whatever happened on the way, the arm is not left moving and the simulation not waiting for steps. It ends unless
-    // somebody else had started it.
-    let ended = cell.arm().stop().and_then(|()| {
-        let sim = cell.arm().sim();
-        sim.set_stepping(false)?;
-        if ran_before || args.leave_running { Ok(()) } else { sim.stop_simulation_and_wait() }
-    });
+    // The simulation ends unless somebody else had started it.
+    cell.leave(captured.is_err() || cancel.is_cancelled(), !(ran_before || args.leave_running));
     if captured.is_err() && !session.document().captures.is_empty() {
         let (count, folder) = (session.document().captures.len(), folder.display());
         let captures = out::counted(count, "capture is", "captures are");
@@ -261,14 +246,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
         guided_record(guide).write(&folder.join(GUIDED_RECORD)).map_err(Failure::failed)?;
     }
     let ending = captured?;
-    if let Err(error) = ended {
-        tracing::warn!(%error, "the simulation could not be stopped");
-    }
     drop(cell);
-    drop(server);
 
-    let goal_m = guide.as_ref().map_or(Goal::default().0, |guide| guide.options().goal_m);
-    let truth = Some(Truth::from(&truth));
+    let goal_m = guide.as_ref().map_or(model::Goal::default().0, |guide| guide.options().goal_m);
     let mut solution = solve::folder(&folder, Method::Joint, Options::default(), goal_m, truth, &cancel)?;
     solution.guided_by(guide.as_ref().map(guided_record));
     finish(&session, args.json.as_ref(), &solution)?;
@@ -282,30 +262,48 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     }
 }
 
-/// What stands around: in the scene, and in the file where one is given. With a file every motion is checked, and kept within
-/// its limits; without one only who chooses poses so asks for it.
-fn surroundings(
-    arm: &mut Arm,
-    kinematics: Option<&ArmKinematics>,
-    is_asked: bool,
-    keep_out: Option<Surroundings>,
-) -> Result<Surroundings, Failure> {
-    let kinematics = match (kinematics, &keep_out) {
-        (Some(kinematics), Some(_)) => kinematics,
-        (Some(kinematics), None) if is_asked => kinematics,
-        (_, None) => return Ok(Surroundings::default()),
-        (None, Some(_)) => {
-            return Err(Failure::failed(anyhow::anyhow!(
-                "--keep-out needs an arm whose chain is known, to know what it would touch: leave the option out, or \
-                 give the scene an arm whose tip hangs on its base (docs/reference/arms.md)"
-            )));
+/// The board: that of the built-in cell and of the public scene, or the one that was described. What lies before a real camera is
+/// never guessed.
+fn target_of(args: &AutoArgs) -> Result<TargetSpec, Failure> {
+    match &args.target {
+        Some(text) => arguments::of_text(text).map_err(Failure::unusable),
+        None if args.cell.driver.is_some() => Err(Failure::unusable(anyhow::anyhow!(
+            "the board before a real camera has to be described: give --target, for example --target 10x7x15"
+        ))),
+        None => Ok(start::BOARD),
+    }
+}
+
+/// The chain that `--arm` names, once it agrees with what the robot reports.
+fn named_arm(named: &str, cell: &mut OpenCell) -> Result<ArmKinematics, Failure> {
+    let here = cell.robot_state()?.joints_rad;
+    match cell.kinematics() {
+        Some(read) => arm_arg::checked(named, read, &here),
+        None => {
+            let unknown = cell.robot()?.err().map_or_else(String::new, |unknown| format!(": {unknown}"));
+            Err(Failure::failed(anyhow::anyhow!("--arm {named} cannot be checked against the robot{unknown}")))
         }
-    };
-    let standing = arm.surroundings(kinematics).map_err(Failure::failed)?.all();
-    let Some(keep_out) = keep_out else { return Ok(standing) };
-    let around = standing.and(keep_out);
-    arm.keep_clear(Some(kinematics.among(around.clone(), None)));
-    Ok(around)
+    }
+}
+
+/// What `--dry-run` shows.
+fn print_plan(cell: &mut OpenCell, plan: &Plan, is_guided: bool) -> Result<(), Failure> {
+    let here = Goal::Joints(cell.robot_state()?.joints_rad.to_vec());
+    out::line(format_args!("the robot stands at: {}", cell.described(&here)))?;
+    if let Some(start) = &plan.start_joints {
+        out::line(format_args!("1. to the start: {}", cell.described(&Goal::Joints(start.clone()))))?;
+    }
+    let first = usize::from(plan.start_joints.is_some()) + 1;
+    for (number, (name, goal)) in (first..).zip(&plan.goals) {
+        out::line(format_args!("{number}. to {name}: {}", cell.described(goal)))?;
+    }
+    if is_guided {
+        out::line(
+            "the first capture is taken where it stands; every further pose is chosen by what the captures before leave \
+             open, on ways that are free, and is logged before the robot moves",
+        )?;
+    }
+    out::line("nothing was moved")
 }
 
 fn finish(session: &Store, json: Option<&Output>, solution: &Solution) -> Result<(), Failure> {

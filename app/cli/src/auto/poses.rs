@@ -4,13 +4,13 @@ use std::path::Path;
 
 use handeye_arm::JointValues;
 use handeye_cell::scene::{ResolvedScene, Scene};
-use handeye_coppeliasim::cell::{Arm, ArmKinematics, BoardInView, GroundTruth};
 use handeye_dataset::taught_poses::{Goal, MotionLimits, TaughtPoses};
-use handeye_plan::{Surroundings, ViewOptions, ViewSetup, poses_looking_at};
+use handeye_plan::{ViewOptions, ViewSetup, poses_looking_at};
 
+use super::super::open_cell::OpenCell;
 use super::super::{Failure, towards_board};
 use handeye_link::limits;
-use handeye_workbench::session::start::{BOARD, REFERENCE_POSES};
+use handeye_workbench::session::start::REFERENCE_POSES;
 
 /// How much the board is tilted at most where guided capture begins.
 const FIRST_TILT_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -82,30 +82,19 @@ impl Plan {
 
     /// Views of the board of a cell that is running, from where its arm stands: by its truth where it publishes that, and else by
     /// where its scene has board and camera.
-    pub fn planned_here(
-        arm: &mut Arm,
-        kinematics: Option<&ArmKinematics>,
-        truth: &GroundTruth,
-        around: &Surroundings,
-        seed: u64,
-    ) -> Result<Self, Failure> {
-        let kinematics = kinematics.ok_or_else(|| {
+    pub fn planned_here(cell: &mut OpenCell, seed: u64) -> Result<Self, Failure> {
+        let board = towards_board::board_in_view(cell)?.ok_or_else(|| {
             Failure::failed(anyhow::anyhow!(
-                "planned views take an arm whose chain is known (docs/reference/arms.md): \
-                 give the poses by a file, --poses FILE"
+                "the position of the board is not known here, so that no views of it can be planned: in a simulation name it by \
+                 --object board=PATH, or bring it into the image and use --poses guided"
             ))
         })?;
-        let base_from_target = towards_board::base_from_target(arm, truth)?.ok_or_else(|| {
+        let views = cell.views(board, PLANNED_VIEWS, seed)?;
+        let views = views.map_err(|why| {
             Failure::failed(anyhow::anyhow!(
-                "the position of the board is not known here, so that no views of it can be planned: name it by --object \
-                 board=PATH, or bring it into the image and use --poses guided"
+                "no views of the board are planned: {why}; --poses FILE takes them from a file"
             ))
         })?;
-        let GroundTruth { tip_from_camera, intrinsics, .. } = *truth;
-        let board = BoardInView { base_from_target, target: BOARD, intrinsics, tip_from_camera };
-        let here = arm.joint_values().map_err(Failure::failed)?;
-        let views =
-            kinematics.views_unlike(&board, &[], &here, around, PLANNED_VIEWS, seed).map_err(Failure::failed)?;
         Ok(Self { start_joints: None, goals: named(views.iter()), limits: limits::SEQUENCE })
     }
 

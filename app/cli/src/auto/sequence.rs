@@ -3,20 +3,19 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use handeye_coppeliasim::cell::{CellClient, CellInfo, MotionTolerance, SettleOptions};
-use handeye_coppeliasim::{CallOptions, LinkError, SimulationState};
 use handeye_dataset::taught_poses::Goal;
 use handeye_geometry::progress::CancelToken;
+use handeye_link::{MotionOutcome, Newest, PortError};
 use handeye_session::{CaptureId, Store};
 
 use super::super::late::Late;
+use super::super::open_cell::{OpenCell, port_failure};
 use super::super::{Failure, record};
 use super::poses::Plan;
-use handeye_link::limits;
-use handeye_workbench::capture::{self, CaptureEnd, CaptureRequest, Images, Measured};
+use handeye_workbench::capture::{self, CaptureEnd, CaptureRequest, Measured};
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
 use handeye_workbench::rerun_log::Recorder;
-use handeye_workbench::text::Language;
+use handeye_workbench::text::{Language, Text};
 
 /// How often a conversation that broke on the way to one pose is taken up again.
 const TRIES: u32 = 3;
@@ -28,7 +27,7 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// A sequence of the poses of a plan.
 pub struct PoseSequence<'a> {
-    pub cell: &'a mut CellClient,
+    pub cell: &'a mut OpenCell,
     pub plan: &'a Plan,
     pub options: CaptureOptions,
     /// Whether the simulation keeps its own pace.
@@ -38,14 +37,55 @@ pub struct PoseSequence<'a> {
     pub cancel: &'a CancelToken,
     /// The clock of the images.
     pub began: Instant,
-    /// Images so far.
-    pub images: u64,
+    pub images: Images,
+}
+
+/// Images so far.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Images {
+    count: u64,
+    /// Time of the last one \[s\].
+    newest_s: Option<f64>,
 }
 
 /// What came of a pose.
 enum Visit {
     Ended(CaptureEnd),
-    Unreached(LinkError),
+    LeftOut(Text),
+}
+
+/// Why work at a pose did not come to its end.
+enum Trouble {
+    Port(PortError),
+    /// Another client holds the simulation.
+    Held(Text),
+    /// The simulation is paused.
+    Paused,
+    /// The motion failed.
+    Failed(Text),
+    Interrupted,
+}
+
+impl From<PortError> for Trouble {
+    fn from(error: PortError) -> Self {
+        match error {
+            PortError::Held(why) => Self::Held(why),
+            error => Self::Port(error),
+        }
+    }
+}
+
+impl From<Trouble> for Failure {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::Port(error) => port_failure(&error),
+            Trouble::Held(why) | Trouble::Failed(why) => {
+                Self::failed(anyhow::anyhow!("{}", why.say(Language::English)))
+            }
+            Trouble::Paused => Self::failed(anyhow::anyhow!("the simulation is paused")),
+            Trouble::Interrupted => Self::failed(anyhow::anyhow!("interrupted")),
+        }
+    }
 }
 
 impl PoseSequence<'_> {
@@ -56,7 +96,7 @@ impl PoseSequence<'_> {
         self.begin()?;
         for (index, (name, goal)) in plan.goals.iter().enumerate() {
             let number = index as u64 + 1;
-            if self.visit(number, name, goal, CapturePurpose::Calibrate)?.is_some() {
+            if self.visit(number, name, Some(goal), CapturePurpose::Calibrate)?.is_some() {
                 tracing::info!("pose {number} of {} captured ({name})", plan.goals.len());
             }
         }
@@ -71,46 +111,42 @@ impl PoseSequence<'_> {
 
     /// Starts the simulation and goes to where the plan begins.
     pub fn begin(&mut self) -> Result<(), Failure> {
-        self.set_going().map_err(Failure::failed)?;
-        match &self.plan.start_joints {
-            Some(start) => self.persisting("the start", |sequence| sequence.move_to_joints(start)),
-            None => Ok(()),
-        }
+        self.cell.set_going(!self.real_time).map_err(|error| port_failure(&error))?;
+        let Some(start) = self.plan.start_joints.clone().map(Goal::Joints) else { return Ok(()) };
+        let gone = self.persisting("the start", |sequence| sequence.go_to("the start", &start))?;
+        gone.map_err(|why| {
+            Failure::failed(anyhow::anyhow!("the arm does not go to the start: {}", why.say(Language::English)))
+        })
     }
 
-    /// Goes to a pose and captures there; the capture, recorded in the session. `None` for a pose that the arm cannot
-    /// reach, or that gives no capture: why is in the log.
+    /// Goes to a pose, if not where the arm stands, and captures there; the capture, recorded in the session. `None` for a pose
+    /// that the arm cannot reach, or that gives no capture: why is in the log.
     pub fn visit(
         &mut self,
         number: u64,
         name: &str,
-        goal: &Goal,
+        goal: Option<&Goal>,
         purpose: CapturePurpose,
     ) -> Result<Option<(CaptureId, Box<Measured>)>, Failure> {
         let visit = self.persisting(&format!("pose {name:?}"), |sequence| {
-            match sequence.go_to(goal) {
-                Err(error @ (LinkError::Unreached { .. } | LinkError::InTheWay { .. })) => {
-                    return Ok(Visit::Unreached(error));
-                }
-                arrived => arrived?,
+            if let Some(goal) = goal
+                && let Err(why) = sequence.go_to(&format!("pose {name:?}"), goal)?
+            {
+                return Ok(Visit::LeftOut(why));
             }
             let (options, document) = (sequence.options, sequence.session.document());
             let request = CaptureRequest::new(number, purpose, options, Some(name.to_owned()), document);
             let target = document.meta.target;
-            let info = sequence.cell.info().clone();
             let mut eye = Passes {
                 cell: &mut *sequence.cell,
-                info,
                 cancel: sequence.cancel,
                 began: sequence.began,
                 images: &mut sequence.images,
-                first: true,
+                has_come_to_rest: goal.is_some(),
             };
             match capture::take(request, &target, &mut eye, sequence.cancel)? {
                 // The next try waits for the simulation, and takes the capture from the beginning.
-                CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => {
-                    Err(LinkError::NotRunning { task: "a capture", state: SimulationState::Paused })
-                }
+                CaptureEnd::Refused(refused) if refused.kind == RefusalKind::Paused => Err(Trouble::Paused),
                 ended => Ok(Visit::Ended(ended)),
             }
         })?;
@@ -126,133 +162,123 @@ impl PoseSequence<'_> {
             Visit::Ended(CaptureEnd::Refused(refused)) => {
                 return Err(Failure::failed(anyhow::anyhow!("{}", refused.why.say(Language::English))));
             }
-            Visit::Unreached(error) => tracing::warn!("pose {name:?} is left out: {error}"),
+            Visit::LeftOut(why) => tracing::warn!("pose {name:?} is left out: {}", why.say(Language::English)),
         }
         Ok(None)
     }
 
-    fn go_to(&mut self, goal: &Goal) -> Result<(), LinkError> {
-        let Self { cell, plan, cancel, .. } = self;
-        match goal {
-            Goal::Tip(pose) => {
-                let limits = limits::of_tip(&plan.limits, 1.0);
-                cell.arm().move_to_pose(pose, &limits, &MotionTolerance::default(), cancel)
-            }
-            Goal::Joints(joints) => {
-                self.move_to_joints(joints)?;
-                // Waiting for the joints costs no images.
-                self.cell.arm().settle(&SettleOptions::default(), self.cancel).map(drop)
-            }
+    /// Whether the arm is there; or why it cannot go there, and others may be tried.
+    fn go_to(&mut self, what: &str, goal: &Goal) -> Result<Result<(), Text>, Trouble> {
+        match self.cell.move_to(what, goal, self.cancel)? {
+            MotionOutcome::Arrived => Ok(Ok(())),
+            // A driver that no longer moves its robot does not move it to the next pose, either.
+            MotionOutcome::Refused(why) if !self.cell.is_simulated() && !self.is_armed() => Err(Trouble::Failed(why)),
+            MotionOutcome::Refused(why) | MotionOutcome::Unreached(why) => Ok(Err(why)),
+            MotionOutcome::Held(why) => Err(Trouble::Held(why)),
+            MotionOutcome::Failed(why) => Err(Trouble::Failed(why)),
+            MotionOutcome::Stopped if self.cancel.is_cancelled() => Err(Trouble::Interrupted),
+            MotionOutcome::Stopped => Err(Trouble::Failed(handeye_wording::text!("The arm was stopped"))),
         }
     }
 
-    fn move_to_joints(&mut self, joints: &[f64]) -> Result<(), LinkError> {
-        let limits = limits::of_joints(&self.plan.limits, 1.0, self.cell.info().joint_kinds());
-        self.cell.arm().move_to_joints(joints, &limits, self.cancel)
+    fn is_armed(&mut self) -> bool {
+        matches!(self.cell.control.state(), Ok(Some(state)) if state.is_armed)
     }
 
-    /// Stepped, a pass takes as long as it takes, and the same command gives the same images on every machine.
-    fn set_going(&mut self) -> Result<(), LinkError> {
-        let sim = self.cell.arm().sim();
-        sim.set_stepping(!self.real_time)?;
-        sim.start_simulation()
-    }
-
-    /// Does something that can be done again: a computer that slept is forgotten by the server, and with it its stepping
-    /// and the motion that was under way; the arm stands where it was.
+    /// Does something that can be done again in a simulation: a computer that slept is forgotten by the server, and with it its
+    /// stepping and the motion that was under way; the arm stands where it was. A robot behind a driver is not moved again by
+    /// itself.
     fn persisting<T>(
         &mut self,
         what: &str,
-        mut work: impl FnMut(&mut Self) -> Result<T, LinkError>,
+        mut work: impl FnMut(&mut Self) -> Result<T, Trouble>,
     ) -> Result<T, Failure> {
         let mut tries = 0;
         let mut outcome = work(self);
         loop {
-            outcome = match outcome {
-                Err(LinkError::NotRunning { state: SimulationState::Paused, .. }) => {
+            let trouble = match outcome {
+                Ok(done) => return Ok(done),
+                Err(_) if self.cancel.is_cancelled() => return Err(Trouble::Interrupted.into()),
+                Err(trouble) => trouble,
+            };
+            let may_pass = self.cell.is_simulated() && tries < TRIES;
+            outcome = match trouble {
+                Trouble::Paused | Trouble::Failed(_) if self.cell.is_paused() => {
                     self.wait_out_pause(what).and_then(|()| work(self))
                 }
-                Err(error) if is_forgotten(&error) && !self.cancel.is_cancelled() && tries < TRIES => {
+                Trouble::Port(error @ PortError::Lost(_)) if may_pass => {
                     tries += 1;
                     tracing::warn!(
-                        "on the way to {what}: {error}. If this computer was asleep, that is why; going on, try {tries} \
-                         of {TRIES}"
+                        "on the way to {what}: {}. If this computer was asleep, that is why; going on, try {tries} of {TRIES}",
+                        error.why().say(Language::English)
                     );
                     thread::sleep(BEFORE_TRY);
                     self.take_up_again().and_then(|()| work(self))
                 }
                 // A client that was killed is forgotten by the server within seconds, and with it what it holds.
-                Err(error @ LinkError::Held { .. }) if !self.cancel.is_cancelled() && tries < TRIES => {
+                Trouble::Held(why) if may_pass => {
                     tries += 1;
-                    tracing::warn!("on the way to {what}: {error}. Trying once more, {tries} of {TRIES}");
+                    let why = why.say(Language::English);
+                    tracing::warn!("on the way to {what}: {why}. Trying once more, {tries} of {TRIES}");
                     self.take_up_again().and_then(|()| work(self))
                 }
-                outcome => return outcome.map_err(Failure::failed),
+                trouble => return Err(trouble.into()),
             };
         }
     }
 
     /// Until somebody lets the simulation go on. One that is ended meanwhile is found out by what comes next.
-    fn wait_out_pause(&mut self, what: &str) -> Result<(), LinkError> {
+    fn wait_out_pause(&mut self, what: &str) -> Result<(), Trouble> {
         tracing::warn!("on the way to {what}: the simulation is paused; this goes on when it does");
-        while self.cell.arm().sim().get_simulation_state()? == SimulationState::Paused {
+        while self.cell.is_paused() {
             if self.cancel.is_cancelled() {
-                return Err(LinkError::Cancelled { call: "waiting for the simulation to go on".to_owned() });
+                return Err(Trouble::Interrupted);
             }
             thread::sleep(LOOK);
         }
         Ok(())
     }
 
-    /// As new clients: what the server may still keep for these would only be in the way.
-    fn take_up_again(&mut self) -> Result<(), LinkError> {
-        self.cell.arm().sim().connection().renew();
-        self.cell.camera().sim().connection().renew();
-        self.set_going()
+    fn take_up_again(&mut self) -> Result<(), Trouble> {
+        self.cell.connect_again(self.cancel).map_err(Trouble::from)
     }
-}
-
-/// Whether the server may no longer know this client, and everything else may be as it was.
-fn is_forgotten(error: &LinkError) -> bool {
-    matches!(
-        error,
-        LinkError::Forgotten { .. }
-            | LinkError::Disconnected { .. }
-            | LinkError::Timeout { .. }
-            | LinkError::Unreachable { .. }
-            | LinkError::OwnCellSilent { .. }
-    )
 }
 
 /// The images of one pass after the other.
 struct Passes<'a> {
-    cell: &'a mut CellClient,
-    info: CellInfo,
+    cell: &'a mut OpenCell,
     cancel: &'a CancelToken,
     began: Instant,
-    images: &'a mut u64,
+    images: &'a mut Images,
     /// The arm has just come to rest, and the images of that pass are there.
-    first: bool,
+    has_come_to_rest: bool,
 }
 
-impl Images for Passes<'_> {
-    type Error = LinkError;
+impl capture::Images for Passes<'_> {
+    type Error = Trouble;
 
     fn now_s(&self) -> f64 {
         self.began.elapsed().as_secs_f64()
     }
 
-    fn next(&mut self) -> Result<LiveFrame, LinkError> {
+    fn next(&mut self) -> Result<LiveFrame, Trouble> {
         let mut late = Late::default();
-        let frame = loop {
-            if !std::mem::take(&mut self.first) {
-                self.cell.arm().sim().step(&CallOptions::cancelled_by(self.cancel))?;
+        let raw = loop {
+            if self.cancel.is_cancelled() {
+                return Err(Trouble::Interrupted);
             }
-            if let Some(frame) = late.grabbed(self.cell.camera().grab(), Instant::now())? {
-                break frame;
+            if !std::mem::take(&mut self.has_come_to_rest) {
+                self.cell.pass(self.cancel)?;
+            }
+            match self.cell.camera.newest(self.images.newest_s)? {
+                Newest::Frame(raw) => break raw,
+                // Time stands still, which the capture has to see.
+                Newest::Same => self.images.newest_s = None,
+                Newest::Awaited => late.waits(Instant::now())?,
             }
         };
-        *self.images += 1;
-        Ok(record::live_frame(&self.info, *self.images, self.now_s(), frame))
+        self.images.newest_s = Some(raw.sim_time_s);
+        self.images.count += 1;
+        Ok(record::live_frame(*raw, self.cell.camera.depth_limits_m(), self.images.count, self.now_s()))
     }
 }

@@ -5,28 +5,24 @@ use std::sync::Arc;
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use handeye_coppeliasim::cell::{
-    Among, Arm, ArmKinematics, BoardMotion, CameraFeed, CellClient, CellPaths, FollowEnd, FollowLimits, FollowMoment,
-    FollowWish as ArmWish, MotionTolerance, SettleOptions, Standing,
-};
-use handeye_coppeliasim::{ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
+use handeye_coppeliasim::cell::{BoardMotion, FollowEnd};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
-use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median_high;
 use handeye_images::gray_from_rgb;
+use handeye_link::{ControlPort, MotionOutcome, Newest, PortError, Simulation, end_of_following};
 use handeye_track::{Estimate, Image, Keep, Setup, State};
 use serde_json::{Value, json};
 
 use crate::late::Late;
+use crate::open_cell::{OpenCell, port_failure};
 use crate::towards_board::TowardsBoard;
-use crate::{Failure, record};
-use handeye_link::limits;
+use crate::{Failure, out, record};
 use handeye_workbench::model::{FollowStatus, FollowWish, Step, Tracked};
 use handeye_workbench::rerun_log::{Entry, Recorder};
 use handeye_workbench::session::start::REFERENCE_POSES;
 use handeye_workbench::text::Language;
-use handeye_workbench::worker::{FollowLine, TrackedImage, Tracking, end_of_following};
+use handeye_workbench::worker::{FollowLine, TrackedImage, Tracking};
 
 /// Rest between two looks at the clock of the cell.
 const LOOK: Duration = Duration::from_millis(2);
@@ -34,7 +30,7 @@ const LOOK: Duration = Duration::from_millis(2);
 /// A line of progress every so often \[s\].
 const PROGRESS_S: f64 = 2.0;
 
-/// The speed of the way to where there is room, as a share of [`limits::SEQUENCE`]: as in the window.
+/// The speed of the way to where there is room, as in the window.
 const SHARE_OF_SPEED: f64 = 0.25;
 
 /// How long the board is looked for from where the arm stands, before the arm goes to where it should be in view.
@@ -71,6 +67,8 @@ pub struct Job<'a> {
     pub frames: Option<u64>,
     /// The cell belongs to this program: how its board moves.
     pub own_cell: Option<BoardMotion>,
+    /// Whether it is only said where the arm would be moved.
+    pub dry_run: bool,
 }
 
 /// Where it goes, image by image.
@@ -79,12 +77,6 @@ pub struct Taken<'a> {
     pub publish: &'a mut dyn FnMut(&Tracked) -> Result<(), Failure>,
     /// Of what was done, also where it ends with an error.
     pub summary: &'a mut Summary,
-}
-
-/// Connections to a cell.
-pub struct Live {
-    arm: Arm,
-    feed: CameraFeed,
 }
 
 /// What came out of it.
@@ -121,148 +113,172 @@ impl Squares {
     }
 }
 
-impl Live {
-    /// Connects to arm and camera, of a cell in this program or elsewhere.
-    pub fn connect(endpoint: &Endpoint, paths: &CellPaths, is_own: bool) -> Result<Self, Failure> {
-        let options = if is_own { ConnectionOptions::own_cell() } else { ConnectionOptions::default() };
-        let cell = CellClient::connect(endpoint, &options, paths).map_err(Failure::failed)?;
-        let (arm, feed) = cell.split();
-        Ok(Self { arm, feed })
+/// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. Following that ends for another
+/// reason is an error.
+pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut Taken<'_>) -> Result<(), Failure> {
+    if let Some(board) = &job.own_cell {
+        prepare_own_cell(cell, board, cancel)?;
     }
-
-    /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. Following that ends
-    /// for another reason is an error.
-    pub fn run(mut self, job: &Job<'_>, cancel: &CancelToken, taken: &mut Taken<'_>) -> Result<(), Failure> {
-        if let Some(board) = &job.own_cell {
-            self.prepare_own_cell(board, cancel)?;
-        }
-        if job.recorder.is_on() {
-            let truth = self.arm.ground_truth().map_err(Failure::failed)?;
-            record::cell(job.recorder, &mut self.arm, &truth).map_err(Failure::failed)?;
-            job.recorder.note(Entry::Step(Step::Track));
-        }
-        let line = Arc::new(FollowLine::default());
-        // It lives until the arm stands: an arm that follows looks at what is tracked.
-        let mut tracking = Tracking::new(job.setup.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
-        let tracking = &mut tracking;
-        let Self { mut arm, mut feed } = self;
-        let wish = match job.task {
-            Task::Watch => {
-                return Self::watch(&mut feed, tracking, job, &line, cancel, &|| false, taken).map(drop);
+    if job.recorder.is_on() {
+        record::cell(job.recorder, &cell.facts);
+        job.recorder.note(Entry::Step(Step::Track));
+    }
+    let line = Arc::new(FollowLine::default());
+    // It lives until the arm stands: an arm that follows looks at what is tracked.
+    let mut tracking = Tracking::new(job.setup.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
+    let mut watch = Watch { tracking: &mut tracking, job, line: &line, cancel, taken };
+    match job.task {
+        Task::Watch => watch.run(cell, &|| false).map(drop),
+        Task::Reach { index, stand_off_m } => {
+            let mut newest = watch.run(cell, &|| false)?;
+            let looks_for_board = cell.is_simulated() && job.own_cell.is_none() && !job.dry_run;
+            if newest.is_none() && looks_for_board && !cancel.is_cancelled() {
+                look_for_board(cell, cancel, &mut |cell| {
+                    newest = watch.run(cell, &|| false)?;
+                    Ok(newest.is_some())
+                })?;
             }
-            Task::Reach { index, stand_off_m } => {
-                let mut newest = Self::watch(&mut feed, tracking, job, &line, cancel, &|| false, taken)?;
-                if newest.is_none() && job.own_cell.is_none() && !cancel.is_cancelled() {
-                    look_for_board(&mut arm, cancel, &mut || {
-                        newest = Self::watch(&mut feed, tracking, job, &line, cancel, &|| false, taken)?;
-                        Ok(newest.is_some())
-                    })?;
-                }
-                return reach(&mut arm, job, newest, index, stand_off_m, cancel);
-            }
-            Task::Follow(wish) => wish,
-        };
-        let end = CancelToken::default();
-        line.begin(wish);
-        let kinematics = arm.kinematics().map_err(Failure::failed)?.map_err(Failure::failed)?;
-        let looks_for_board = job.own_cell.is_none();
-        let follower = Follower { arm, kinematics, wish, line: Arc::clone(&line), end: end.clone(), looks_for_board };
-        let arm_thread =
-            Builder::new().name("follow".to_owned()).spawn(move || follower.run()).map_err(Failure::failed)?;
-        let watched = Self::watch(&mut feed, tracking, job, &line, cancel, &|| arm_thread.is_finished(), taken);
-        end.cancel();
-        let followed = arm_thread
-            .join()
-            .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
-        watched?;
-        let end = followed?;
-        // What ends in the very moment in which it was followed enough has done what it was asked to.
-        if cancel.is_cancelled() || job.frames.is_some_and(|frames| taken.summary.frames >= frames) {
-            return Ok(());
+            reach(cell, job, newest, index, stand_off_m, cancel)
         }
-        let has_no_room = matches!(end, FollowEnd::JointLimit { .. } | FollowEnd::Singular);
-        let hint = if has_no_room { " (--make-room)" } else { "" };
-        let why = match end {
-            FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(&FollowEnd::Released)),
-            end => end_of_following(&end),
-        };
-        let why = why.say(Language::English);
-        let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}{hint}"));
-        taken.summary.follow_ended = Some(why);
-        Err(error)
+        Task::Follow(wish) => follow_board(cell, job, &mut watch, wish),
     }
+}
 
-    /// Has the arm of the cell that this program started look at the board, and the board move.
-    fn prepare_own_cell(&mut self, board: &BoardMotion, cancel: &CancelToken) -> Result<(), Failure> {
-        self.arm.sim().start_simulation().map_err(Failure::failed)?;
-        // The reference poses are those of the UR5. Any other arm begins where its scene has it.
-        if self.arm.kinematics().map_err(Failure::failed)?.is_ok_and(|arm| arm.is_ur5()) {
-            self.look_at_board(cancel)?;
+/// The arm on a thread and over connections of its own, while images are tracked here.
+fn follow_board(
+    cell: &mut OpenCell,
+    job: &Job<'_>,
+    watch: &mut Watch<'_, '_>,
+    wish: FollowWish,
+) -> Result<(), Failure> {
+    let (end, line) = (CancelToken::default(), Arc::clone(watch.line));
+    line.begin(wish);
+    let mut arm = cell.another(watch.cancel)?;
+    arm.go_no_faster_than(SHARE_OF_SPEED);
+    let looks_for_board = job.own_cell.is_none();
+    let follower = Follower { cell: arm, wish, line: Arc::clone(&line), end: end.clone(), looks_for_board };
+    let arm_thread = Builder::new().name("follow".to_owned()).spawn(move || follower.run()).map_err(Failure::failed)?;
+    let watched = watch.run(cell, &|| arm_thread.is_finished());
+    end.cancel();
+    let followed = arm_thread
+        .join()
+        .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
+    watched?;
+    let end = followed?;
+    let summary = &mut watch.taken.summary;
+    // What ends in the very moment in which it was followed enough has done what it was asked to.
+    if watch.cancel.is_cancelled() || job.frames.is_some_and(|frames| summary.frames >= frames) {
+        return Ok(());
+    }
+    let has_no_room = matches!(end, FollowEnd::JointLimit { .. } | FollowEnd::Singular);
+    let hint = if has_no_room { " (--make-room)" } else { "" };
+    let why = match end {
+        FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(&FollowEnd::Released)),
+        end => end_of_following(&end),
+    };
+    let why = why.say(Language::English);
+    let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}{hint}"));
+    summary.follow_ended = Some(why);
+    Err(error)
+}
+
+/// Has the arm of the cell that this program started look at the board, and the board move.
+fn prepare_own_cell(cell: &mut OpenCell, board: &BoardMotion, cancel: &CancelToken) -> Result<(), Failure> {
+    cell.set_going(false).map_err(|error| port_failure(&error))?;
+    // The reference poses are those of the UR5. Any other arm begins where its scene has it.
+    if cell.kinematics().is_some_and(|arm| arm.is_ur5()) {
+        look_at_board(cell, cancel)?;
+    }
+    cell.control.move_board(board).map_err(|error| port_failure(&error))
+}
+
+fn look_at_board(cell: &mut OpenCell, cancel: &CancelToken) -> Result<(), Failure> {
+    let poses = TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?;
+    // Close to its column the arm has no room to follow.
+    let from_column = |goal: &Goal| match goal {
+        Goal::Tip(pose) => pose.translation().xy().norm(),
+        Goal::Joints(_) => 0.0,
+    };
+    let goals = poses.poses.iter().map(|taught| &taught.goal);
+    match goals.max_by(|a, b| from_column(a).total_cmp(&from_column(b))) {
+        Some(first) => moved(&cell.move_to("a view of the board", first, cancel)).map(drop),
+        None => Ok(()),
+    }
+}
+
+/// Whether the arm is there, and not stopped on its way.
+fn moved(outcome: &Result<MotionOutcome, PortError>) -> Result<bool, Failure> {
+    match outcome {
+        Ok(MotionOutcome::Arrived) => Ok(true),
+        Ok(MotionOutcome::Stopped) => Ok(false),
+        Ok(outcome) => {
+            let why = outcome.why().map_or_else(String::new, |why| why.say(Language::English));
+            Err(Failure::failed(anyhow::anyhow!("{why}")))
         }
-        self.arm.move_board(board).map_err(Failure::failed)
+        Err(error) => Err(port_failure(error)),
     }
+}
 
-    fn look_at_board(&mut self, cancel: &CancelToken) -> Result<(), Failure> {
-        let poses = TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?;
-        let goals = poses.poses.iter().filter_map(|taught| match &taught.goal {
-            Goal::Tip(goal) => Some(goal),
-            Goal::Joints(_) => None,
-        });
-        // Close to its column the arm has no room to follow.
-        let from_column = |goal: &Pose<Base, Tip>| goal.translation().xy().norm();
-        if let Some(first) = goals.max_by(|a, b| from_column(a).total_cmp(&from_column(b))) {
-            let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
-            self.arm
-                .move_to_pose(first, &limits, &MotionTolerance::default(), cancel)
-                .and_then(|()| self.arm.settle(&SettleOptions::default(), cancel).map(|_| ()))
-                .map_err(Failure::failed)?;
-        }
-        Ok(())
-    }
+/// Images in, poses out.
+struct Watch<'a, 't> {
+    tracking: &'a mut Tracking,
+    job: &'a Job<'a>,
+    line: &'a Arc<FollowLine>,
+    cancel: &'a CancelToken,
+    taken: &'a mut Taken<'t>,
+}
 
-    fn watch(
-        feed: &mut CameraFeed,
-        tracking: &mut Tracking,
-        job: &Job<'_>,
-        line: &FollowLine,
-        cancel: &CancelToken,
-        arm_stands: &dyn Fn() -> bool,
-        taken: &mut Taken<'_>,
-    ) -> Result<Option<Estimate>, Failure> {
-        let Taken { publish, summary } = taken;
+impl Watch<'_, '_> {
+    /// Until there are images enough, the arm stands or it is cancelled; the newest estimate.
+    fn run(&mut self, cell: &mut OpenCell, arm_stands: &dyn Fn() -> bool) -> Result<Option<Estimate>, Failure> {
+        let Self { tracking, job, line, cancel, taken: Taken { publish, summary } } = self;
         let frames = match job.task {
             // Of each place where the board is looked for.
             Task::Reach { .. } => Some(summary.frames + job.frames.unwrap_or(IMAGES_BEFORE_REACH)),
             Task::Watch | Task::Follow(_) => job.frames,
         };
         let mut newest = None;
-        let far_plane_m = feed.info().depth_optics.far_m as f32;
+        let depth_limits_m = cell.camera.depth_limits_m();
         let began = Instant::now();
         let (mut pause, mut late) = (Pause::default(), Late::default());
-        let mut seen_s = f64::NEG_INFINITY;
+        let (mut seen_s, mut has_pose) = (None, true);
         let mut next_line_s = PROGRESS_S;
         while !cancel.is_cancelled() && !arm_stands() && frames.is_none_or(|frames| summary.frames < frames) {
-            let now_s = feed.sim().get_simulation_time().map_err(Failure::failed)?;
-            if now_s == seen_s {
-                pause.look(feed.sim()).map_err(Failure::failed)?;
-                std::thread::sleep(LOOK);
-                continue;
-            }
+            let raw = match cell.camera.newest(seen_s).map_err(|error| port_failure(&error))? {
+                Newest::Frame(raw) => *raw,
+                Newest::Same => {
+                    pause.look(cell.control.as_mut()).map_err(|error| port_failure(&error))?;
+                    std::thread::sleep(LOOK);
+                    continue;
+                }
+                Newest::Awaited => {
+                    late.waits(Instant::now()).map_err(|error| port_failure(&error))?;
+                    continue;
+                }
+            };
             pause.is_over();
-            let Some(frame) = late.grabbed(feed.grab(), Instant::now()).map_err(Failure::failed)? else { continue };
+            late.came();
             let received_s = began.elapsed().as_secs_f64();
-            seen_s = frame.sim_time_s;
+            seen_s = Some(raw.sim_time_s);
+            let Some(base_from_tip) = raw.base_from_tip else {
+                if std::mem::replace(&mut has_pose, false) {
+                    let why = raw.no_pose.map_or_else(String::new, |why| why.say(Language::English));
+                    tracing::warn!("an image is left out, because it is not known where the robot was: {why}");
+                }
+                continue;
+            };
+            has_pose = true;
             let sight = TrackedImage {
                 number: summary.frames + 1,
                 received_s,
                 image: Image {
-                    time_s: frame.sim_time_s,
-                    grey: &gray_from_rgb(&frame.rgb),
-                    depth: Some(&frame.depth),
-                    far_plane_m,
-                    base_from_tip: frame.base_from_tip,
+                    time_s: raw.sim_time_s,
+                    grey: &gray_from_rgb(&raw.rgb),
+                    depth: raw.depth.as_ref(),
+                    far_plane_m: depth_limits_m[1],
+                    base_from_tip,
                 },
-                base_from_target_true: frame.base_from_target_true,
+                base_from_target_true: raw.base_from_target_true,
             };
             let tracked = tracking.see(&sight, &|| began.elapsed().as_secs_f64()).map_err(Failure::failed)?;
             let took_s = began.elapsed().as_secs_f64();
@@ -270,7 +286,9 @@ impl Live {
             summary.add(&tracked, line.take_status().as_ref(), took_s);
             publish(&tracked)?;
             if job.recorder.is_on() {
-                record::image(job.recorder, feed.info(), summary.frames, frame);
+                // There is no clock of a window here.
+                let received_s = raw.sim_time_s;
+                record::image(job.recorder, record::live_frame(raw, depth_limits_m, summary.frames, received_s));
                 job.recorder.note(Entry::Tracked(Arc::new(tracked.clone())));
             }
             if took_s > next_line_s {
@@ -293,20 +311,21 @@ struct Pause {
 }
 
 impl Pause {
-    fn look(&mut self, sim: &mut Sim) -> Result<(), LinkError> {
+    fn look(&mut self, control: &mut dyn ControlPort) -> Result<(), PortError> {
         let since = *self.since.get_or_insert_with(Instant::now);
         if self.is_said || since.elapsed() < STANDS_STILL {
             return Ok(());
         }
         self.is_said = true;
-        match sim.get_simulation_state()? {
-            SimulationState::Running => {
+        let Some(state) = control.state()? else { return Ok(()) };
+        match state.simulation {
+            Simulation::Running => {
                 tracing::warn!(
                     "the simulated time does not advance, perhaps because another client holds it: waiting for it"
                 );
             }
-            SimulationState::Paused => tracing::warn!("the simulation is paused: waiting until it is continued"),
-            SimulationState::Stopped => tracing::warn!("the simulation is stopped: waiting until it is started"),
+            Simulation::Paused => tracing::warn!("the simulation is paused: waiting until it is continued"),
+            Simulation::Stopped => tracing::warn!("the simulation is stopped: waiting until it is started"),
         }
         Ok(())
     }
@@ -321,8 +340,7 @@ impl Pause {
 
 /// The arm that follows, on a thread of its own.
 struct Follower {
-    arm: Arm,
-    kinematics: ArmKinematics,
+    cell: OpenCell,
     wish: FollowWish,
     line: Arc<FollowLine>,
     end: CancelToken,
@@ -342,27 +360,21 @@ fn is_seen_within(line: &FollowLine, end: &CancelToken, limit: Option<Duration>)
 /// Has a simulated arm that does not see the board go to where it should be in view, on ways that are known to be free, until
 /// it `is_seen`.
 fn look_for_board(
-    arm: &mut Arm,
+    cell: &mut OpenCell,
     cancel: &CancelToken,
-    is_seen: &mut dyn FnMut() -> Result<bool, Failure>,
+    is_seen: &mut dyn FnMut(&mut OpenCell) -> Result<bool, Failure>,
 ) -> Result<(), Failure> {
-    let Ok(kinematics) = arm.kinematics().map_err(Failure::failed)? else { return Ok(()) };
-    let around = arm.surroundings(&kinematics).map_err(Failure::failed)?.all();
-    let truth = arm.ground_truth().map_err(Failure::failed)?;
-    let places = TowardsBoard::all(arm, &kinematics, &truth, &around)?;
-    arm.keep_clear(Some(kinematics.among(around, None)));
-    for TowardsBoard { name, joints } in places {
+    for TowardsBoard { name, goal } in TowardsBoard::all(cell)? {
         tracing::info!("the board is not in view here: the arm goes to {name}");
-        let limits = limits::of_joints(&limits::SEQUENCE, SHARE_OF_SPEED, arm.info().joint_kinds());
-        match arm.move_to_joints(&joints, &limits, cancel) {
-            Err(error @ (LinkError::Unreached { .. } | LinkError::InTheWay { .. })) => {
-                tracing::warn!("the arm does not go to {name}: {error}");
+        match cell.move_to(name, &goal, cancel) {
+            Ok(MotionOutcome::Refused(why) | MotionOutcome::Unreached(why)) => {
+                tracing::warn!("the arm does not go to {name}: {}", why.say(Language::English));
                 continue;
             }
-            Err(LinkError::Cancelled { .. }) => return Ok(()),
-            moved => moved.map_err(Failure::failed)?,
+            outcome if !moved(&outcome)? => return Ok(()),
+            _ => {}
         }
-        if is_seen()? {
+        if is_seen(cell)? {
             break;
         }
     }
@@ -377,52 +389,30 @@ impl Follower {
         while !self.line.is_seen() && !self.end.is_cancelled() && !self.is_running()? {
             is_seen_within(&self.line, &self.end, Some(LOOKED_FOR));
         }
-        if !self.line.is_seen() && self.looks_for_board && !self.end.is_cancelled() {
-            let (line, end) = (Arc::clone(&self.line), self.end.clone());
-            look_for_board(&mut self.arm, &end, &mut || Ok(is_seen_within(&line, &end, Some(LOOKED_FOR))))?;
+        let Self { mut cell, wish, line, end, looks_for_board } = self;
+        if !line.is_seen() && looks_for_board && !end.is_cancelled() {
+            look_for_board(&mut cell, &end, &mut |_| Ok(is_seen_within(&line, &end, Some(LOOKED_FOR))))?;
         }
-        is_seen_within(&self.line, &self.end, None);
-        let standing = self.arm.surroundings(&self.kinematics).map_err(Failure::failed)?;
-        let among = self.kinematics.among(standing.around.clone(), None);
-        self.arm.keep_clear(Some(among.clone()));
-        if self.wish == FollowWish::KeepViewWithRoom && !self.end.is_cancelled() {
-            self.make_room(&standing, &among)?;
+        is_seen_within(&line, &end, None);
+        match cell.follow(&line, wish, &end)? {
+            Ok(end) => Ok(end),
+            // Following ends at its first pass.
+            Err(MotionOutcome::Stopped) => Ok(FollowEnd::Released),
+            Err(outcome) => {
+                let why = outcome.why().map_or_else(String::new, |why| why.say(Language::English));
+                Err(Failure::failed(anyhow::anyhow!("{why}")))
+            }
         }
-        let Self { mut arm, kinematics, line, end, .. } = self;
-        let mut wanted = |moment: &FollowMoment| if end.is_cancelled() { ArmWish::End } else { line.wish(moment) };
-        arm.follow(&kinematics, &FollowLimits::default(), &mut wanted).map_err(Failure::failed)
     }
 
     fn is_running(&mut self) -> Result<bool, Failure> {
-        let state = self.arm.sim().get_simulation_state().map_err(Failure::failed)?;
-        Ok(state == SimulationState::Running)
-    }
-
-    /// Moves to the nearest place from which the arm can go along with the board, where it cannot from here.
-    fn make_room(&mut self, standing: &Standing, among: &Among) -> Result<(), Failure> {
-        let Some(board) = self.line.board_in_view() else { return Ok(()) };
-        let joints = self.arm.joint_values().map_err(Failure::failed)?;
-        let limits = FollowLimits::default();
-        let place = self.kinematics.where_to_follow(&limits, &board, &joints, &standing.all(), Some(among));
-        let Some(place) = place.map_err(Failure::failed)? else { return Ok(()) };
-        tracing::info!(
-            "here the arm has no room to follow the board: it moves to the nearest place where it has, and keeps the \
-             view from there"
-        );
-        let limits = limits::of_joints(&limits::SEQUENCE, SHARE_OF_SPEED, self.arm.info().joint_kinds());
-        match self.arm.move_to_joints(&place.joints, &limits, &self.end) {
-            // Following ends at its first pass.
-            Err(LinkError::Cancelled { .. }) => {}
-            moved => moved.map_err(Failure::failed)?,
-        }
-        self.line.begin_elsewhere(self.wish);
-        Ok(())
+        Ok(self.cell.robot_state()?.simulation == Simulation::Running)
     }
 }
 
-/// Moves the tip once to where a corner is by the newest estimate.
+/// Moves the tip once to where a corner is by the newest estimate, or says where that is.
 fn reach(
-    arm: &mut Arm,
+    cell: &mut OpenCell,
     job: &Job<'_>,
     newest: Option<Estimate>,
     index: usize,
@@ -432,20 +422,19 @@ fn reach(
     let estimate = newest.ok_or_else(|| {
         Failure::failed(anyhow::anyhow!("the board is not seen: move the arm or the board until the camera sees it"))
     })?;
-    let base_from_tip_orientation = arm.base_from_tip().map_err(Failure::failed)?.rotation();
+    let base_from_tip_orientation = cell.robot_state()?.base_from_tip.rotation();
     let keep = Keep::Corner { index, stand_off_m, base_from_tip_orientation };
     let goal = keep.tip_goal(&estimate, &job.setup.calibrated, &job.setup.target).ok_or_else(|| {
         Failure::unusable(anyhow::anyhow!(
             "only a camera on the tip can lead it to the board; this one stands beside the robot"
         ))
     })?;
-    let kinematics = arm.kinematics().map_err(Failure::failed)?;
-    if let Ok(kinematics) = &kinematics {
-        let joints = arm.joint_values().map_err(Failure::failed)?;
-        kinematics.reach(&goal.base_from_tip, &joints).map_err(Failure::failed)?;
+    let goal = Goal::Tip(goal.base_from_tip);
+    if job.dry_run {
+        out::line(format_args!("to corner {index}: {}", cell.described(&goal)))?;
+        return out::line("nothing was moved");
     }
-    let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
-    arm.move_to_pose(&goal.base_from_tip, &limits, &MotionTolerance::default(), cancel).map_err(Failure::failed)
+    moved(&cell.move_to(&format!("corner {index}"), &goal, cancel)).map(drop)
 }
 
 fn progress(tracked: &Tracked) -> String {

@@ -7,20 +7,19 @@ mod live;
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_coppeliasim::Endpoint;
-use handeye_coppeliasim::cell::CellPaths;
 use handeye_coppeliasim::cell::{BoardMotion, BoardPath};
-use handeye_server::{CellConfig, CellServer};
+use handeye_server::CellConfig;
 use handeye_track::{MotionModel, Setup};
 
-use super::cell::SceneArg;
 use super::output::Output;
+use crate::cell_choice::CellChoice;
+use crate::open_cell::OpenCell;
 use crate::rerun_arg;
-use crate::{Failure, ObjectArgs, RerunArg, out, solve};
+use crate::{Failure, RerunArg, out, solve};
 use handeye_workbench::arguments::heading;
 use handeye_workbench::model::{FollowWish, Tracked};
 use handeye_workbench::rerun_log::{Pace, RerunChoice};
-use live::{Job, Live, Summary, Taken, Task};
+use live::{Job, Summary, Taken, Task};
 
 /// At the end of its help.
 pub const EXAMPLES: &str = "Examples:
@@ -33,11 +32,8 @@ Until Ctrl-C:
 /// Options of `handeye track`.
 #[derive(Debug, Args)]
 pub struct TrackArgs {
-    /// Address of a CoppeliaSim or cell; without it the built-in cell is started, with a board that moves.
-    #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
-    connect: Option<String>,
     #[command(flatten)]
-    objects: ObjectArgs,
+    cell: CellChoice,
     /// The calibration: a result JSON, or a session that is solved.
     #[arg(long, value_name = "FILE", help_heading = heading::TRACKING)]
     calibration: PathBuf,
@@ -66,17 +62,12 @@ pub struct TrackArgs {
     /// The chessboard, if the calibration does not say it: inner corners along x and y, and the square.
     #[arg(long, value_name = "COLUMNSxROWSxMM", help_heading = heading::TRACKING)]
     target: Option<String>,
-    #[command(flatten)]
-    scene: SceneArg,
-    /// Seed of everything random in the built-in cell.
-    #[arg(long, value_name = "N", help_heading = heading::CELL)]
-    seed: Option<u64>,
     /// How the built-in cell moves its board: still, circle, figure_eight, random_walk or step; a circle if neither this
     /// nor the scene says it.
-    #[arg(long, value_name = "PATH", conflicts_with = "connect", help_heading = heading::BOARD)]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["connect", "driver"], help_heading = heading::BOARD)]
     board_path: Option<BoardPath>,
     /// How fast, metres per second; as the scene says if not given.
-    #[arg(long, value_name = "SPEED", conflicts_with = "connect", help_heading = heading::BOARD)]
+    #[arg(long, value_name = "SPEED", conflicts_with_all = ["connect", "driver"], help_heading = heading::BOARD)]
     board_speed: Option<f64>,
     #[command(flatten)]
     rerun: RerunArg,
@@ -84,11 +75,7 @@ pub struct TrackArgs {
 
 pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
-    if args.connect.is_some() && args.scene.is_given() {
-        return Err(Failure::unusable(anyhow::anyhow!(
-            "--scene describes the built-in cell and --connect takes another: give one of them"
-        )));
-    }
+    let mut scene = args.cell.scene()?;
     let (calibrated, said_target) = calibration::read(&args.calibration)?;
     let target = match &args.target {
         Some(text) => calibration::chessboard(text)?,
@@ -99,7 +86,6 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
             ))
         })?,
     };
-    let mut scene = args.scene.load()?;
     // The arm first has to look at the board.
     let motion = std::mem::take(&mut scene.board.motion);
     let path = args.board_path.unwrap_or(if motion.path == BoardPath::Still { BoardPath::Circle } else { motion.path });
@@ -108,16 +94,6 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         tilt_deg: Some(motion.tilt_deg),
         ..BoardMotion::along(path, args.board_speed.unwrap_or(motion.speed_m_s))
     };
-    let paths = if args.connect.is_some() { CellPaths::default() } else { CellPaths::below(&scene.robot.name) };
-    let paths = args.objects.paths(paths);
-    let server = if args.connect.is_some() {
-        None
-    } else {
-        let config = CellConfig { seed: args.seed, real_time: Some(true), ..CellConfig::new(scene) };
-        Some(CellServer::start(config).map_err(Failure::failed)?)
-    };
-    let address = args.connect.clone().or_else(|| server.as_ref().map(CellServer::endpoint)).unwrap_or_default();
-    let endpoint: Endpoint = address.parse().map_err(Failure::unusable)?;
     if let Some(index) = args.corner.or(args.reach).filter(|&index| index >= target.len()) {
         return Err(Failure::unusable(anyhow::anyhow!(
             "there is no corner {index}: a {target} has corners 0 to {}",
@@ -135,6 +111,11 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         (true, None, None) => Task::Follow(FollowWish::KeepView),
         (false, _, None) => Task::Watch,
     };
+    if matches!(task, Task::Follow(_)) && (args.cell.driver.is_some() || args.cell.dry_run) {
+        return Err(Failure::unusable(anyhow::anyhow!(
+            "--follow moves simulated arms alone, and not in a dry run: --reach moves a robot behind a driver once"
+        )));
+    }
     let recorder = rerun_arg::start(&args.rerun, RerunChoice::Off, Pace::Live, false)?;
     let job = Job {
         recorder: &recorder,
@@ -142,7 +123,8 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         task,
         frames: args.frames,
         // The board of somebody else's cell is not ours to move, nor is the arm before it follows.
-        own_cell: server.is_some().then_some(board),
+        own_cell: (!args.cell.is_given()).then_some(board),
+        dry_run: args.cell.dry_run,
     };
     let mut document = document::Document::begin(args.json.as_ref(), &args.calibration)?;
     let mut add = |tracked: &Tracked| {
@@ -153,8 +135,18 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         Ok(())
     };
     let mut summary = Summary::default();
-    let tracked = Live::connect(&endpoint, &paths, server.is_some())
-        .and_then(|live| live.run(&job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary }));
+    let own = CellConfig { seed: args.cell.seed, real_time: Some(true), ..CellConfig::new(scene) };
+    let tracked = OpenCell::connect(&args.cell, own, &cancel).and_then(|mut cell| {
+        let moves = !matches!(task, Task::Watch) && !args.cell.dry_run;
+        if moves {
+            cell.allow_motion(args.cell.allow_motion)?;
+        }
+        let tracked = live::run(&mut cell, &job, &cancel, &mut Taken { publish: &mut add, summary: &mut summary });
+        if moves && !cell.is_simulated() {
+            cell.leave(tracked.is_err() || cancel.is_cancelled(), false);
+        }
+        tracked
+    });
     // What was tracked before an error is as good as the rest.
     document.finish(&summary, tracked.as_ref().err())?;
     let is_worth_saying = tracked.is_ok() || !summary.is_empty();

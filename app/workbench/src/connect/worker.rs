@@ -135,7 +135,7 @@ impl Duty for Control {
                 }
                 Err(error) => Err(error),
             },
-            ControlTask::MoveBoard(motion) => board_answer(port.move_board(&motion), outlet),
+            ControlTask::MoveBoard(motion) => board_answer(port.move_board(&motion.of_cell()), outlet),
             ControlTask::HideBoard(hidden) => board_answer(port.hide_board(hidden), outlet),
             ControlTask::Arm(on) => match port.arm(on) {
                 Err(PortError::Refused(why)) => {

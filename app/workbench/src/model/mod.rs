@@ -6,19 +6,17 @@
 pub(crate) mod workflow;
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use handeye_arm::{JointKind, JointValues};
-use handeye_cell::scene::SceneChoice;
 use handeye_coppeliasim::cell::CellPaths;
 use handeye_estimate::Method;
 use handeye_estimate::handeye::HandEye;
 use handeye_estimate::verify::Predictor;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::ColourMap;
-use handeye_geometry::frames::{Base, Camera, Pose, Tip};
+use handeye_geometry::frames::{Camera, Pose, Tip};
 use handeye_plan::guided::GuidedOptions;
 use handeye_plan::guided::choose::Proposal;
 use handeye_session::{CaptureId, Document};
@@ -44,13 +42,13 @@ pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
 pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
 pub use crate::track::state::{
-    FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
+    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
 };
 pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
 pub use handeye_coppeliasim::cell::BoardPath;
 pub use handeye_link::{
-    ArmDoubt, Axis, BoardMotion, CellFacts, CellSource, Drivers, Jog, JogFrame, JointFacts, MotionGoal, MotionOutcome,
-    Moves, RobotState, Simulation, Truth,
+    ArmDoubt, Axis, CellFacts, CellSource, Drivers, Jog, JogFrame, JointFacts, MotionGoal, MotionOutcome, Moves,
+    RobotState, Simulation, Truth,
 };
 pub use workflow::{Dialog, Pane, Step};
 

@@ -69,7 +69,7 @@ impl App {
                 let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
                 self.say_in(Pane::Jog, Severity::Warning, said);
             }
-            MotionOutcome::Failed(why) => {
+            MotionOutcome::Unreached(why) | MotionOutcome::Failed(why) | MotionOutcome::Held(why) => {
                 let said = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
                 self.say_in(Pane::Jog, Severity::Error, said);
             }

@@ -5,18 +5,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{FollowMoment, FollowWish as ArmWish};
+use handeye_coppeliasim::cell::FollowEnd;
 use handeye_plan::guided::choose::Robot;
 
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;
 use crate::command::Event;
 use crate::guided::state::{Choice, GuideRequest};
-use crate::model::{FollowStatus, FollowWish, Link, MotionGoal, MotionId, MotionOutcome, Severity};
+use crate::model::{FollowStatus, FollowWish, Link, MotionId, MotionOutcome, Severity};
 use crate::text::Text;
+use crate::track::follow::follow;
 use crate::track::follow_line::FollowLine;
 use crate::worker::link::{Duty, Outlet};
-use handeye_link::{Cell, Connected, JogRequest, MotionPort, PortError, Room, ViewsRequest};
+use handeye_link::{Cell, Connected, JogRequest, MotionPort, PortError, ViewsRequest, end_of_following};
 use handeye_wording::text;
 
 /// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
@@ -108,31 +109,23 @@ impl Motions {
         cancel: &CancelToken,
         outlet: &Outlet,
     ) -> Result<MotionOutcome, PortError> {
-        let board = self.line.board_in_view().filter(|_| wish == FollowWish::KeepViewWithRoom);
-        match board.map(|board| port.room(&board)).transpose()? {
-            None | Some(Room::Enough) => self.line.begin(wish),
-            Some(Room::Nowhere(why)) => return Ok(MotionOutcome::Refused(why)),
-            Some(Room::At(joints)) => {
-                outlet.report(Event::Follow(FollowStatus::MakingRoom));
-                outlet.notice(
-                    Severity::Info,
-                    text!(
-                        "Here the arm has no room to follow the board: it moves to the nearest place where it has, and keeps the view from there"
-                    ),
-                );
-                match port.move_to(&MotionGoal::Joints(joints), speed, cancel)? {
-                    MotionOutcome::Arrived => self.line.begin_elsewhere(wish),
-                    outcome => return Ok(outcome),
-                }
-            }
-        }
-        let mut wanted = |moment: &FollowMoment| {
-            if cancel.is_cancelled() { ArmWish::End } else { self.line.wish(moment) }
+        let mut makes_room = || {
+            outlet.report(Event::Follow(FollowStatus::MakingRoom));
+            outlet.notice(
+                Severity::Info,
+                text!(
+                    "Here the arm has no room to follow the board: it moves to the nearest place where it has, and keeps the view from there"
+                ),
+            );
         };
-        let outcome = port.follow(&mut wanted)?;
-        Ok(match (outcome, self.line.take_ended()) {
-            (MotionOutcome::Stopped, Some(why)) if !cancel.is_cancelled() => MotionOutcome::Failed(why),
-            (outcome, _) => outcome,
+        let followed = follow(port, &self.line, wish, speed, cancel, &mut makes_room)?;
+        Ok(match (followed, self.line.take_ended()) {
+            (Err(outcome), _) => outcome,
+            (Ok(FollowEnd::Released | FollowEnd::Stopped), Some(why)) if !cancel.is_cancelled() => {
+                MotionOutcome::Failed(why)
+            }
+            (Ok(FollowEnd::Released | FollowEnd::Stopped), _) => MotionOutcome::Stopped,
+            (Ok(obstacle), _) => MotionOutcome::Failed(end_of_following(&obstacle)),
         })
     }
 

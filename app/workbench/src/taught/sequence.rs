@@ -14,6 +14,8 @@ use handeye_wording::text;
 
 /// Poses that are planned to verify at: enough for an average and a scatter, and over within a minute or two.
 const VERIFYING: usize = 5;
+/// Chooses them: the same question gets the same poses.
+const VIEWS_SEED: u64 = 1;
 
 impl App {
     pub(crate) fn run_sequence(&mut self, purpose: Option<CapturePurpose>) {
@@ -83,7 +85,7 @@ impl App {
             self.model.document().captures.iter().filter(|it| !it.excluded).filter_map(|it| it.base_from_tip).collect();
         self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
         self.model.messages.is_over_in(Pane::Verify);
-        let request = ViewsRequest { board, taken, count: VERIFYING };
+        let request = ViewsRequest { board, taken, count: VERIFYING, seed: VIEWS_SEED };
         let asked = self.workers.plan_views(self.numbers.motion, request);
         self.model.planning = asked.is_ok();
         self.numbers.plan = asked.is_ok().then_some(self.numbers.motion);
@@ -116,7 +118,7 @@ impl App {
     /// Nothing is planned after all: the arm does something else, or was stopped.
     pub(crate) fn plan_refused(&mut self, outcome: &MotionOutcome) {
         self.model.planning = false;
-        if let MotionOutcome::Refused(why) | MotionOutcome::Failed(why) = outcome {
+        if let Some(why) = outcome.why() {
             let said = text!("There are no poses to verify at: {why}", why = why.clone());
             self.say_in(Pane::Verify, Severity::Warning, said);
         }
@@ -185,8 +187,12 @@ impl App {
             }
             // A pose that cannot be reached is left out; the others can still be visited.
             MotionOutcome::Refused(why) if self.guided_was_refused() => self.break_off(Some(why.clone())),
-            MotionOutcome::Refused(why) => self.end_stop(StopOutcome::Skipped(why.clone())),
-            MotionOutcome::Stopped | MotionOutcome::Failed(_) => self.break_off(outcome.why().cloned()),
+            MotionOutcome::Refused(why) | MotionOutcome::Unreached(why) => {
+                self.end_stop(StopOutcome::Skipped(why.clone()));
+            }
+            MotionOutcome::Stopped | MotionOutcome::Failed(_) | MotionOutcome::Held(_) => {
+                self.break_off(outcome.why().cloned())
+            }
         }
     }
 

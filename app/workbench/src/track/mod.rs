@@ -1,5 +1,6 @@
 //! The board from image to image, and the arm that follows it.
 
+pub mod follow;
 pub(crate) mod follow_line;
 pub(crate) mod state;
 pub(crate) mod trail;

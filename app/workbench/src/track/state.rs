@@ -1,10 +1,9 @@
 //! The board as it is tracked, and the arm that follows it.
 
-use handeye_link::BoardMotion;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use handeye_coppeliasim::cell::BoardPath;
+use handeye_coppeliasim::cell::{self, BoardPath};
 use handeye_geometry::frames::{Base, Camera, Pose, Target};
 use handeye_track::Update;
 use serde::{Deserialize, Serialize};
@@ -113,4 +112,20 @@ pub struct TrackState {
     pub board: BoardMotion,
     /// Whether this program asked the cell to hide its board.
     pub board_hidden: bool,
+}
+
+/// How a simulated cell moves its board.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct BoardMotion {
+    /// Along which path.
+    pub path: BoardPath,
+    /// How fast [m/s].
+    pub speed_m_s: f64,
+}
+
+impl BoardMotion {
+    /// As the cell is asked for it: with the sizes that it takes by itself.
+    pub fn of_cell(&self) -> cell::BoardMotion {
+        cell::BoardMotion::along(self.path, self.speed_m_s)
+    }
 }

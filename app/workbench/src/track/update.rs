@@ -113,7 +113,10 @@ impl App {
         self.model.track.wish = None;
         let (severity, why) = match outcome {
             MotionOutcome::Arrived | MotionOutcome::Stopped => (Severity::Info, text!("it was stopped")),
-            MotionOutcome::Refused(why) | MotionOutcome::Failed(why) => (Severity::Warning, why),
+            MotionOutcome::Refused(why)
+            | MotionOutcome::Unreached(why)
+            | MotionOutcome::Failed(why)
+            | MotionOutcome::Held(why) => (Severity::Warning, why),
         };
         let said = text!("The arm does not follow the board: {why}", why = why.clone());
         match severity {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use handeye_arm::{ArmKind, JointKind, JointValues};
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{self, ArmKinematics, BoardInView, FollowEnd, FollowMoment, FollowWish};
 use handeye_driver::LogLevel;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::DepthImage;
@@ -222,8 +222,8 @@ impl ControlPort for FakeCell {
         Ok(())
     }
 
-    fn move_board(&mut self, motion: &BoardMotion) -> Result<(), PortError> {
-        self.answer()?.board = *motion;
+    fn move_board(&mut self, motion: &cell::BoardMotion) -> Result<(), PortError> {
+        self.answer()?.board = BoardMotion { path: motion.path, speed_m_s: motion.speed_m_s };
         Ok(())
     }
 
@@ -312,11 +312,15 @@ impl MotionPort for FakeCell {
         Ok(Surroundings::default())
     }
 
-    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+    fn follow(
+        &mut self,
+        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+    ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
         let RobotState { base_from_tip, joints_rad, .. } = self.state()?.expect("it has one");
         let sim_time_s = || self.script().frames as f64 * 0.05;
         let moment = |sim_time_s| FollowMoment { sim_time_s, joints: joints_rad, base_from_tip, is_kept_off: false };
-        self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)
+        let outcome = self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)?;
+        Ok(if outcome == MotionOutcome::Stopped { Ok(FollowEnd::Released) } else { Err(outcome) })
     }
 }
 

@@ -398,7 +398,7 @@ fn poses_are_planned_without_a_motion_and_the_arm_is_free_afterwards() {
     let (cell, mut bench) = fake(FakeMotions::Arrive);
     tracked(&bench);
     let board = bench.workers.follow.board_in_view().expect("tracked");
-    let request = ViewsRequest { board, taken: Vec::new(), count: 2 };
+    let request = ViewsRequest { board, taken: Vec::new(), count: 2, seed: 1 };
     let views = vec![JointValues::from([0.1; 6]), [0.2; 6].into()];
     cell.script().views = Ok(views.clone());
     bench.workers.plan_views(MotionId(1), request).expect("the worker is there");

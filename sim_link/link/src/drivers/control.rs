@@ -1,13 +1,13 @@
 //! The robot behind a driver: where it is, whether it may be moved, stop.
 
 use handeye_arm::JointValues;
-use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_coppeliasim::cell::{self, ArmKinematics};
 use handeye_driver::message::Ability;
 use handeye_driver::{ChainPlacement, Driver, DriverCell, LogLevel};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::{TypedPose, port_error};
-use crate::{ArmDoubt, BoardMotion, CellFacts, JointFacts, Moves, RobotState, Simulation};
+use crate::{ArmDoubt, CellFacts, JointFacts, Moves, RobotState, Simulation};
 use crate::{ControlPort, PortError};
 use handeye_wording::text;
 
@@ -101,7 +101,7 @@ impl ControlPort for DriverControl {
         self.cell.robot().stop().map_err(port_error)
     }
 
-    fn move_board(&mut self, _motion: &BoardMotion) -> Result<(), PortError> {
+    fn move_board(&mut self, _motion: &cell::BoardMotion) -> Result<(), PortError> {
         Err(Self::simulated())
     }
 

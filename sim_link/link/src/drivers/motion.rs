@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowEnd, FollowMoment, FollowWish};
 use handeye_driver::message::Ability;
 use handeye_driver::{ChainPlacement, Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use super::port_error;
 use crate::limits;
 use crate::moved::moved_text;
-use crate::remote::{VIEWS_SEED, contact_text, no_views};
+use crate::remote::{contact_text, no_views};
 use crate::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 use crate::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use handeye_wording::Text;
@@ -233,9 +233,9 @@ impl MotionPort for DriverMotion {
     }
 
     fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
-        let ViewsRequest { board, taken, count } = request;
+        let ViewsRequest { board, taken, count, seed } = request;
         Ok(self.placed()?.and_then(|Placed { kinematics, joints, around }| {
-            let views = kinematics.views_unlike(board, taken, &joints, &around, *count, VIEWS_SEED);
+            let views = kinematics.views_unlike(board, taken, &joints, &around, *count, *seed);
             views.map_err(|why| no_views(&why))
         }))
     }
@@ -256,8 +256,11 @@ impl MotionPort for DriverMotion {
         })
     }
 
-    fn follow(&mut self, _wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
-        Ok(MotionOutcome::Refused(cannot_follow()))
+    fn follow(
+        &mut self,
+        _wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+    ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
+        Ok(Err(MotionOutcome::Refused(cannot_follow())))
     }
 }
 

@@ -21,13 +21,13 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
             endpoint = endpoint
         ),
         LinkError::NoSuchObject { path, there, .. } if there.is_empty() => text!(
-            "The scene has no {path}. Open the scene of the cell, or say under Connect, Objects of the scene, where it has \
-             that part",
+            "The scene has no {path}. Open the scene of the cell, or say where it has that part: under Connect, Objects of the \
+             scene, or by --object on the command line",
             path = path
         ),
         LinkError::NoSuchObject { path, there, .. } => text!(
-            "The scene has no {path}, but {there}. Say under Connect, Objects of the scene, which it is, or open the scene \
-             of the cell",
+            "The scene has no {path}, but {there}. Say which it is, under Connect, Objects of the scene, or by --object on the \
+             command line; or open the scene of the cell",
             path = path,
             there = there.join(", ")
         ),
@@ -41,9 +41,16 @@ pub(crate) fn port_error(error: LinkError) -> PortError {
     };
     match error {
         LinkError::BadEndpoint { .. } => PortError::Hopeless(text),
-        error if error.is_connection_loss() => PortError::Lost(text),
+        error if is_lost(&error) => PortError::Lost(text),
+        LinkError::Held { .. } => PortError::Held(text),
         _ => PortError::Refused(text),
     }
+}
+
+/// Whether the connection has to be made again: also where the server no longer knows this client, as after this computer was
+/// asleep.
+pub(crate) fn is_lost(error: &LinkError) -> bool {
+    error.is_connection_loss() || matches!(error, LinkError::Forgotten { .. })
 }
 
 /// Why nothing answers now.

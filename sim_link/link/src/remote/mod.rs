@@ -8,15 +8,17 @@ use std::sync::{Mutex, PoisonError};
 use handeye_cell::scene::SceneChoice;
 use handeye_coppeliasim::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_coppeliasim::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, SimulationState};
+use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_geometry::targets::TargetSpec;
 use handeye_server::{CellConfig, CellServer};
 
 use error::{check, check_arm, port_error};
 use motion::RemoteMotion;
 pub use motion::end_of_following;
-pub(crate) use motion::{VIEWS_SEED, contact_text, no_views};
+pub(crate) use motion::{contact_text, no_views};
 
 use crate::port::{CameraPort, Cell, Connected, ControlPort, MotionPort, Newest, PortError, RawFrame};
-use crate::{BoardMotion, CellFacts, RobotState, Simulation};
+use crate::{CellFacts, RobotState, Simulation};
 
 /// A cell over the remote API: the built-in one, which it starts, or one that runs.
 pub struct RemoteCell {
@@ -30,6 +32,8 @@ pub struct RemoteCell {
 enum Server {
     /// Started by this program.
     BuiltIn(SceneChoice),
+    /// The same, started by who holds the cell, and never started again.
+    Own(CellServer),
     /// There already.
     At(String),
 }
@@ -38,6 +42,11 @@ impl RemoteCell {
     /// To the built-in cell with a scene; it is started when it is first connected to.
     pub fn built_in(scene: SceneChoice) -> Self {
         Self { cell: Server::BuiltIn(scene), paths: CellPaths::default(), server: Mutex::new(None) }
+    }
+
+    /// To a built-in cell that was started for this alone. It ends with this.
+    pub fn own(server: CellServer, objects: CellPaths) -> Self {
+        Self { cell: Server::Own(server), paths: objects, server: Mutex::new(None) }
     }
 
     /// To what runs at an address, and has its parts at `objects`.
@@ -49,6 +58,7 @@ impl RemoteCell {
     fn endpoint(&self) -> Result<Endpoint, PortError> {
         let address = match &self.cell {
             Server::At(address) => address.clone(),
+            Server::Own(server) => server.endpoint(),
             Server::BuiltIn(scene) => {
                 let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
                 match server.as_ref() {
@@ -68,12 +78,12 @@ impl RemoteCell {
     ) -> Result<Half, PortError> {
         let endpoint = self.endpoint()?;
         let usual = match &self.cell {
-            Server::BuiltIn(_) => ConnectionOptions::own_cell(),
+            Server::BuiltIn(_) | Server::Own(_) => ConnectionOptions::own_cell(),
             Server::At(_) => ConnectionOptions::default(),
         };
         let options = ConnectionOptions { shutdown: shutdown.clone(), ..usual };
         let connected = half(&endpoint, &options, &self.paths);
-        if let Err(LinkError::OwnCellEnded { .. }) = &connected {
+        if let (Err(LinkError::OwnCellEnded { .. }), Server::BuiltIn(_)) = (&connected, &self.cell) {
             self.give_up_server(&endpoint);
         }
         connected.map_err(port_error)
@@ -93,7 +103,7 @@ impl RemoteCell {
     }
 
     fn describe(&self, info: &CellInfo) -> String {
-        if matches!(self.cell, Server::BuiltIn(_)) {
+        if matches!(self.cell, Server::BuiltIn(_) | Server::Own(_)) {
             return "built-in cell".to_owned();
         }
         if info.is_handeye_cell {
@@ -167,13 +177,20 @@ impl ControlPort for RemoteControl {
         self.arm.sim().start_simulation().map_err(port_error)
     }
 
+    fn stop_simulation(&mut self) -> Result<(), PortError> {
+        self.arm.sim().stop_simulation_and_wait().map_err(port_error)
+    }
+
+    fn base_from_board(&mut self, target: &TargetSpec) -> Result<Option<Pose<Base, Target>>, PortError> {
+        self.arm.base_from_board(target).map_err(port_error)
+    }
+
     fn stop(&mut self) -> Result<(), PortError> {
         self.arm.stop().map_err(port_error)
     }
 
-    fn move_board(&mut self, motion: &BoardMotion) -> Result<(), PortError> {
-        let motion = cell::BoardMotion::along(motion.path, motion.speed_m_s);
-        self.arm.move_board(&motion).map_err(port_error)
+    fn move_board(&mut self, motion: &cell::BoardMotion) -> Result<(), PortError> {
+        self.arm.move_board(motion).map_err(port_error)
     }
 
     fn hide_board(&mut self, hidden: bool) -> Result<(), PortError> {

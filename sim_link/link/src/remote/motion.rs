@@ -5,20 +5,21 @@ use handeye_coppeliasim::cell::{
     Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd,
     JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
 };
-use handeye_coppeliasim::{CancelToken, LinkError, SimulationState};
+use handeye_coppeliasim::{CallOptions, CancelToken, LinkError, SimulationState};
+use handeye_dataset::taught_poses;
 use handeye_plan::guided::choose::Robot;
 use handeye_plan::{Contact, PlanError, Surroundings};
 use nalgebra::Vector3;
 
-use super::error::{check_arm, port_error};
+use super::error::{check_arm, is_lost, port_error};
 use crate::limits;
 use crate::{Axis, Jog, JogFrame, MotionGoal, MotionOutcome};
 use crate::{JogRequest, MotionPort, PortError, Room, ViewsRequest};
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// Seed of the views that are compared for a plan: the same question gets the same plan.
-pub(crate) const VIEWS_SEED: u64 = 1;
+/// Seed of the detours that are compared: the same question gets the same way.
+const VIEWS_SEED: u64 = 1;
 
 /// A connection that moves the arm.
 pub(crate) struct RemoteMotion {
@@ -30,6 +31,8 @@ pub(crate) struct RemoteMotion {
     around: Surroundings,
     /// The arm among all of it that does not go along with the board.
     among: Option<Among>,
+    /// The fastest that it moves.
+    limits: taught_poses::MotionLimits,
 }
 
 impl RemoteMotion {
@@ -43,7 +46,8 @@ impl RemoteMotion {
                 Standing::default()
             }
         };
-        let mut live = Self { arm, kinematics, standing, around: Surroundings::default(), among: None };
+        let mut live =
+            Self { arm, kinematics, standing, around: Surroundings::default(), among: None, limits: limits::SEQUENCE };
         live.keep_to(&Surroundings::default());
         Ok(live)
     }
@@ -71,7 +75,7 @@ impl RemoteMotion {
             (_, Some(why)) => Err(why),
             (MotionGoal::Joints(joints), None) => Self::unless_in_the_way(self.go_through(&[*joints], speed, cancel))?,
             (MotionGoal::Tip(pose), None) => {
-                let limits = limits::of_tip(&limits::SEQUENCE, speed);
+                let limits = limits::of_tip(&self.limits, speed);
                 let moved = self.arm.move_to_pose(pose, &limits, &MotionTolerance::default(), cancel);
                 Self::unless_in_the_way(moved)?
             }
@@ -93,7 +97,7 @@ impl RemoteMotion {
 
     /// From configuration to configuration, straight in joint space.
     fn go_through(&mut self, way: &[JointValues], speed: f64, cancel: &CancelToken) -> Result<(), LinkError> {
-        let limits = limits::of_joints(&limits::SEQUENCE, speed, self.arm.info().joint_kinds());
+        let limits = limits::of_joints(&self.limits, speed, self.arm.info().joint_kinds());
         for joints in way {
             self.arm.move_to_joints(joints, &limits, cancel)?;
         }
@@ -129,6 +133,18 @@ impl RemoteMotion {
 }
 
 impl MotionPort for RemoteMotion {
+    fn step_by_step(&mut self, on: bool) -> Result<(), PortError> {
+        self.arm.sim().set_stepping(on).map_err(port_error)
+    }
+
+    fn pass(&mut self, cancel: &CancelToken) -> Result<(), PortError> {
+        self.arm.sim().step(&CallOptions::cancelled_by(cancel)).map_err(port_error)
+    }
+
+    fn limit(&mut self, limits: &taught_poses::MotionLimits) {
+        self.limits = *limits;
+    }
+
     fn check(&mut self) -> Result<(), PortError> {
         check_arm(&mut self.arm)
     }
@@ -165,7 +181,7 @@ impl MotionPort for RemoteMotion {
             Ok(Ok(JogEnd::Obstacle(obstacle))) => Ok(Some(obstacle_text(&obstacle))),
             Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),
             Ok(Err(why)) => Ok(Some(why)),
-            Err(error) if error.is_connection_loss() => Err(port_error(error)),
+            Err(error) if is_lost(&error) => Err(port_error(error)),
             Err(error) => Ok(Some(said(&error))),
         }
     }
@@ -187,7 +203,7 @@ impl MotionPort for RemoteMotion {
     }
 
     fn views(&mut self, request: &ViewsRequest) -> Result<Result<Vec<JointValues>, Text>, PortError> {
-        let ViewsRequest { board, taken, count } = request;
+        let ViewsRequest { board, taken, count, seed } = request;
         let kinematics = match &self.kinematics {
             Ok(kinematics) => kinematics,
             Err(why) => {
@@ -195,9 +211,7 @@ impl MotionPort for RemoteMotion {
             }
         };
         let start = self.arm.joint_values().map_err(port_error)?;
-        Ok(kinematics
-            .views_unlike(board, taken, &start, &self.around, *count, VIEWS_SEED)
-            .map_err(|why| no_views(&why)))
+        Ok(kinematics.views_unlike(board, taken, &start, &self.around, *count, *seed).map_err(|why| no_views(&why)))
     }
 
     fn robot(&mut self, speed: f64) -> Result<Result<Robot, Text>, PortError> {
@@ -206,7 +220,7 @@ impl MotionPort for RemoteMotion {
             Err(why) => return Ok(Err(text!("The kinematics of the arm is not known: {why}", why = why))),
         };
         let joints = self.arm.joint_values().map_err(port_error)?;
-        Ok(Ok(kinematics.guided_robot(&joints, limits::pace(&limits::SEQUENCE, speed), &self.around)))
+        Ok(Ok(kinematics.guided_robot(&joints, limits::pace(&self.limits, speed), &self.around)))
     }
 
     fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
@@ -217,19 +231,22 @@ impl MotionPort for RemoteMotion {
         }
     }
 
-    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<MotionOutcome, PortError> {
+    fn follow(
+        &mut self,
+        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+    ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
         let kinematics = match &self.kinematics {
             Ok(kinematics) => kinematics,
             Err(why) => {
-                return Ok(MotionOutcome::Refused(text!(
+                return Ok(Err(MotionOutcome::Refused(text!(
                     "The arm cannot follow, because its kinematics is not known: {why}",
                     why = why
-                )));
+                ))));
             }
         };
         match self.arm.follow(kinematics, &FollowLimits::default(), wish) {
-            Ok(end) => Ok(outcome_of_following(end)),
-            Err(error) => outcome_of(error, &CancelToken::default()),
+            Ok(end) => Ok(Ok(end)),
+            Err(error) => outcome_of(error, &CancelToken::default()).map(Err),
         }
     }
 }
@@ -251,13 +268,6 @@ pub(crate) fn no_views(why: &PlanError) -> Text {
             no_path = no_path
         ),
         other => other.into(),
-    }
-}
-
-fn outcome_of_following(end: FollowEnd) -> MotionOutcome {
-    match end {
-        FollowEnd::Released | FollowEnd::Stopped => MotionOutcome::Stopped,
-        obstacle => MotionOutcome::Failed(end_of_following(&obstacle)),
     }
 }
 
@@ -295,7 +305,9 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
     match error {
         LinkError::MotionStopped { .. } => Ok(MotionOutcome::Stopped),
         LinkError::Cancelled { .. } if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
-        error if error.is_connection_loss() => Err(port_error(error)),
+        error if is_lost(&error) => Err(port_error(error)),
+        error @ LinkError::Unreached { .. } => Ok(MotionOutcome::Unreached(said(&error))),
+        error @ LinkError::Held { .. } => Ok(MotionOutcome::Held(said(&error))),
         // These are found out before anything moves.
         error @ (LinkError::JointOutOfRange { .. }
         | LinkError::JointCount { .. }

@@ -1,0 +1,37 @@
+//! An arm that goes along with the board.
+
+use handeye_coppeliasim::CancelToken;
+use handeye_coppeliasim::cell::{FollowEnd, FollowMoment, FollowWish as ArmWish};
+use handeye_link::{MotionGoal, MotionOutcome, MotionPort, PortError, Room};
+
+use super::follow_line::FollowLine;
+use crate::model::FollowWish;
+
+/// Has the arm do what is wished about the board that is tracked, from a place where it has room if that is wished, to which it
+/// moves at a share of its fastest speed; `makes_room` hears of that beforehand. Returns when the arm stands: how following ended,
+/// or why it was not begun or failed.
+///
+/// # Errors
+/// [`PortError::Lost`] and the like.
+pub fn follow(
+    port: &mut dyn MotionPort,
+    line: &FollowLine,
+    wish: FollowWish,
+    speed: f64,
+    cancel: &CancelToken,
+    makes_room: &mut dyn FnMut(),
+) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
+    let board = line.board_in_view().filter(|_| wish == FollowWish::KeepViewWithRoom);
+    match board.map(|board| port.room(&board)).transpose()? {
+        None | Some(Room::Enough) => line.begin(wish),
+        Some(Room::Nowhere(why)) => return Ok(Err(MotionOutcome::Refused(why))),
+        Some(Room::At(joints)) => {
+            makes_room();
+            match port.move_to(&MotionGoal::Joints(joints), speed, cancel)? {
+                MotionOutcome::Arrived => line.begin_elsewhere(wish),
+                outcome => return Ok(Err(outcome)),
+            }
+        }
+    }
+    port.follow(&mut |moment: &FollowMoment| if cancel.is_cancelled() { ArmWish::End } else { line.wish(moment) })
+}
