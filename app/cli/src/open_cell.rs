@@ -40,9 +40,6 @@ pub struct OpenCell {
     pub camera: Box<dyn CameraPort>,
     motion: Box<dyn MotionPort>,
     pub facts: CellFacts,
-    /// What a person keeps the arm out of, for connections that are made again.
-    keep_out: Surroundings,
-    limits: Option<MotionLimits>,
     /// Whether simulated time is to go on by steps.
     is_stepped: bool,
     speed: f64,
@@ -68,18 +65,19 @@ impl OpenCell {
                 Arc::new(RemoteCell::own(CellServer::start(own).map_err(Failure::failed)?, paths))
             }
         };
-        Self::over(cell, choice.speed(), cancel)
+        Self::over(cell, choice.driver.is_some(), choice.speed(), cancel)
     }
 
-    fn over(cell: Arc<dyn Cell>, speed: f64, cancel: &CancelToken) -> Result<Self, Failure> {
+    fn over(cell: Arc<dyn Cell>, is_driven: bool, speed: f64, cancel: &CancelToken) -> Result<Self, Failure> {
         let failed = |error: PortError| port_failure(&error);
-        let mut control = cell.control(cancel).map_err(failed)?.port;
-        let camera = cell.camera(cancel).map_err(failed)?.port;
-        let motion = cell.motion(cancel).map_err(failed)?.port;
+        // Connections outlive Ctrl-C: the arm has to be stopped over them. Only drivers, which may take long, are not waited for.
+        let shutdown = if is_driven { cancel.clone() } else { CancelToken::default() };
+        let mut control = cell.control(&shutdown).map_err(failed)?.port;
+        let camera = cell.camera(&shutdown).map_err(failed)?.port;
+        let motion = cell.motion(&shutdown).map_err(failed)?.port;
         let facts = first_facts(control.as_mut(), cancel)?;
-        let (keep_out, limits) = (Surroundings::default(), None);
         let (is_stepped, motions) = (false, 0);
-        Ok(Self { cell, control, camera, motion, facts, keep_out, limits, is_stepped, speed, motions })
+        Ok(Self { cell, control, camera, motion, facts, is_stepped, speed, motions })
     }
 
     /// Whether it is a simulation, which anybody may move.
@@ -92,9 +90,7 @@ impl OpenCell {
     /// # Errors
     /// When they cannot be made.
     pub fn another(&self, cancel: &CancelToken) -> Result<Self, Failure> {
-        let mut another = Self::over(Arc::clone(&self.cell), self.speed, cancel)?;
-        another.keep_out.clone_from(&self.keep_out);
-        Ok(another)
+        Self::over(Arc::clone(&self.cell), !self.is_simulated(), self.speed, cancel)
     }
 
     /// From now on at this share of its fastest speed at most.
@@ -192,21 +188,19 @@ impl OpenCell {
     ///
     /// # Errors
     /// When they cannot be kept out of, since the chain of the arm is not known.
-    pub fn keep_out(&mut self, keep_out: Surroundings) -> Result<(), Failure> {
-        self.motion.keep_out(&keep_out).map_err(|why| {
+    pub fn keep_out(&mut self, keep_out: &Surroundings) -> Result<(), Failure> {
+        self.motion.keep_out(keep_out).map_err(|why| {
             Failure::failed(anyhow::anyhow!(
                 "--keep-out needs an arm whose chain is known, to know what it would touch (docs/reference/arms.md): {}",
                 why.say(Language::English)
             ))
         })?;
-        self.keep_out = keep_out;
         Ok(())
     }
 
     /// The fastest that a simulated arm moves from now on.
-    pub fn limit(&mut self, limits: MotionLimits) {
-        self.motion.limit(&limits);
-        self.limits = Some(limits);
+    pub fn limit(&mut self, limits: &MotionLimits) {
+        self.motion.limit(limits);
     }
 
     /// Starts the simulation. Stepped, a pass takes as long as it takes, and the same command gives the same images on every
@@ -231,20 +225,14 @@ impl OpenCell {
         self.motion.pass(cancel)
     }
 
-    /// Connections made again, with what was said over the last: what a server may still keep for those would only be in the way.
+    /// Takes up again what was interrupted, as new clients of the same server.
     ///
     /// # Errors
     /// [`PortError`].
-    pub fn connect_again(&mut self, cancel: &CancelToken) -> Result<(), PortError> {
-        self.control = self.cell.control(cancel)?.port;
-        self.camera = self.cell.camera(cancel)?.port;
-        self.motion = self.cell.motion(cancel)?.port;
-        if let Some(limits) = &self.limits {
-            self.motion.limit(limits);
-        }
-        if let Err(why) = self.motion.keep_out(&self.keep_out) {
-            tracing::debug!(?why, "nothing can be kept out of");
-        }
+    pub fn take_up_again(&mut self) -> Result<(), PortError> {
+        self.control.renew();
+        self.camera.renew();
+        self.motion.renew();
         self.set_going(self.is_stepped)
     }
 

@@ -110,11 +110,11 @@ fn action(
 fn work(model: &Model, language: Language) -> Vec<Action> {
     let with = |name, keys, command, available| action(name, Group::Work, keys, command, available);
     let plain = |name, command, available| with(name, &[], command, available);
-    let hindrance = crate::capture::pane::hindrance(model);
+    let hindrance = crate::shell::reasons::hindrance(model);
     let takes = hindrance.is_none();
-    let moves = crate::taught::pane::immovable(model).is_none();
+    let moves = crate::shell::reasons::immovable(model).is_none();
     let has_poses = !model.document().taught.is_empty();
-    let has_robot = crate::capture::pane::needs_robot(model).is_none();
+    let has_robot = crate::shell::reasons::needs_robot(model).is_none();
     let run = |name, purpose: Option<CapturePurpose>| {
         plain(name, Command::RunSequence { purpose }, moves && has_poses && (has_robot || purpose.is_none()))
     };
@@ -132,12 +132,12 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
         plain(
             tr!(language, "Calibrate for me"),
             Command::CalibrateForMe,
-            crate::guided::pane::blocked(model, hindrance).is_none() && model.takes_chosen_poses(),
+            crate::guided::section::blocked(model, hindrance).is_none() && model.takes_chosen_poses(),
         ),
         plain(
             tr!(language, "Guide me"),
             Command::GuideByHand,
-            takes && hand.is_none() && crate::by_hand::pane::blocked(model).is_none(),
+            takes && hand.is_none() && crate::by_hand::section::blocked(model).is_none(),
         ),
         run(tr!(language, "Capture at each taught pose"), Some(CapturePurpose::Calibrate)),
         run(tr!(language, "Verify at each taught pose"), Some(CapturePurpose::Verify)),
@@ -156,7 +156,7 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
         plain(
             tr!(language, "Move there"),
             Command::ConfirmMove,
-            asks && crate::taught::pane::unmovable(model).is_none() && model.motion == Motion::Idle,
+            asks && crate::shell::reasons::unmovable(model).is_none() && model.motion == Motion::Idle,
         ),
         plain(tr!(language, "Skip this pose"), Command::SkipMove, asks),
         plain(
@@ -260,7 +260,7 @@ fn window(model: &Model, language: Language) -> Vec<Action> {
         all.push(with(other.own_name(), &[], Command::SetLanguage(other), true));
     }
     for pane in Pane::ALL {
-        all.push(action(shell::title(pane, language), Group::Panes, &[], Command::ShowPane(pane), true));
+        all.push(action(shell::panes::title(pane, language), Group::Panes, &[], Command::ShowPane(pane), true));
     }
     all
 }

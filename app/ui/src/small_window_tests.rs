@@ -9,7 +9,7 @@ use handeye_plan::guided::GuidedOptions;
 use handeye_plan::guided::by_hand::Judged;
 
 use super::style::theme;
-use crate::by_hand::pane::to_do;
+use crate::by_hand::section::to_do;
 use crate::testing::Silent;
 use handeye_workbench::by_hand::state::HandWaits;
 use handeye_workbench::model::{ByHand, CellSource, Model};

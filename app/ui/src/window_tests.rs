@@ -221,7 +221,7 @@ fn nothing_is_cut_off_at_the_smallest_size() {
         let mut labels: Vec<_> =
             ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour image", "Depth image"].into_iter().map(tr).collect();
         labels.push(format!("{}: 0.0 s", tr("Image age")));
-        labels.extend(Pane::ALL.map(|pane| shell::title(pane, language).to_owned()));
+        labels.extend(Pane::ALL.map(|pane| shell::panes::title(pane, language).to_owned()));
         for label in labels {
             let nodes: Vec<_> = silent.harness.query_all_by_label(&label).collect();
             assert!(!nodes.is_empty(), "{label} is not there");

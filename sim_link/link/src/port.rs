@@ -162,6 +162,9 @@ pub trait ControlPort: Send {
         Ok(())
     }
 
+    /// Goes on as another client of the same server: what that may still keep for this one would only be in the way.
+    fn renew(&mut self) {}
+
     /// Takes the pose that a person reads off the pendant; `None` once the robot has been moved on.
     ///
     /// # Errors
@@ -213,6 +216,9 @@ pub enum Room {
 
 /// What moves the arm.
 pub trait MotionPort: Send {
+    /// As [`ControlPort::renew`].
+    fn renew(&mut self) {}
+
     /// From now on simulated time advances by [`Self::pass`] and the motions of this connection alone, or by itself again.
     /// Time that is not simulated goes on.
     ///
@@ -338,6 +344,9 @@ pub trait CameraPort: Send {
     /// # Errors
     /// [`PortError`].
     fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError>;
+
+    /// As [`ControlPort::renew`].
+    fn renew(&mut self) {}
 
     /// Depths \[m\] that the sensor can measure; it reports the far one where nothing reflects.
     fn depth_limits_m(&self) -> [f32; 2];

@@ -96,3 +96,26 @@ fn the_description_of_a_crate_is_there_for_a_registry() {
         assert!(!is_library || (1..=5).contains(&keywords), "{} has {keywords} keywords", text("name"));
     }
 }
+
+/// What several panes show is in the shell.
+#[test]
+fn no_pane_knows_the_pane_of_another_feature() {
+    let ui = workspace_root().join("app/ui/src");
+    let (mut files, mut seen) = (Vec::new(), Vec::new());
+    sources(&ui, &mut files);
+    for file in &files {
+        let path = file.strip_prefix(&ui).expect("below it").to_string_lossy().replace('\\', "/");
+        let Some((feature, _)) = path.split_once('/').filter(|(folder, _)| *folder != "shell") else { continue };
+        let text = std::fs::read_to_string(file).expect("a source");
+        let other = |line: &&str| {
+            line.match_indices("::pane").any(|(at, _)| {
+                let before: String =
+                    line[..at].chars().rev().take_while(|c| c.is_alphanumeric() || "_:".contains(*c)).collect();
+                let before: String = before.chars().rev().collect();
+                before.strip_prefix("crate::").is_some_and(|named| named.split("::").next() != Some(feature))
+            })
+        };
+        seen.extend(text.lines().filter(other).map(|line| format!("{path}: {}", line.trim())));
+    }
+    assert!(files.len() > 100 && seen.is_empty(), "{}", seen.join("\n"));
+}

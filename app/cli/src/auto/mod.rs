@@ -179,9 +179,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let own = CellConfig { seed: args.cell.seed, real_time: Some(args.real_time), ..CellConfig::new(scene) };
     let mut cell = OpenCell::connect(&args.cell, own, &cancel)?;
     plan.check_joints(cell.facts.joints.len())?;
-    cell.limit(plan.limits);
+    cell.limit(&plan.limits);
     let ran_before = cell.robot_state()?.simulation != Simulation::Stopped;
-    if let Some(keep_out) = keep_out {
+    if let Some(keep_out) = &keep_out {
         cell.keep_out(keep_out)?;
     }
     // That the chain is not known is no fault: joint angles are then kept and not used.

@@ -240,7 +240,7 @@ impl PoseSequence<'_> {
     }
 
     fn take_up_again(&mut self) -> Result<(), Trouble> {
-        self.cell.connect_again(self.cancel).map_err(Trouble::from)
+        self.cell.take_up_again().map_err(Trouble::from)
     }
 }
 

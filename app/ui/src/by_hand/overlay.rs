@@ -5,8 +5,11 @@ use egui::{Align2, Color32, Painter, Pos2, Shape, Stroke};
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
-use super::pane::to_do;
-use crate::live::pane::{Place, Projector, board_lines};
+use super::section::to_do;
+use crate::live::{
+    place::Place,
+    project::{Projector, board_lines},
+};
 use crate::style::marks::{self, Marks};
 use handeye_workbench::by_hand::state::HandWaits;
 use handeye_workbench::model::Model;

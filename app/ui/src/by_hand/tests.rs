@@ -2,7 +2,7 @@ use handeye_plan::guided::GuidedOptions;
 use handeye_plan::guided::by_hand::{Deviation, Judged};
 use nalgebra::Vector2;
 
-use super::pane::{begin_ui, progress_ui};
+use super::section::{begin_ui, progress_ui};
 use crate::testing::driven::Driven;
 use handeye_workbench::by_hand::state::{ByHand, HandWaits};
 use handeye_workbench::command::Command;

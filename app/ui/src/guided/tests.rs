@@ -3,7 +3,7 @@ use std::sync::Arc;
 use handeye_dataset::taught_poses::TaughtPose;
 use handeye_plan::guided::{Ending, GuidedOptions, Why};
 
-use super::pane::{begin_ui, progress_ui};
+use super::section::{begin_ui, progress_ui};
 use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::guided::state::{GuidedProgress, Waits};

@@ -1,3 +1,3 @@
 //! Boxes that the arm keeps out of, besides what the cell says stands around it: drawn in the 3D pane, kept in a file.
 
-pub(crate) mod pane;
+pub(crate) mod editor;

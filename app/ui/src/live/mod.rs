@@ -2,4 +2,6 @@
 
 pub(crate) mod colour_bar;
 pub(crate) mod pane;
+pub(crate) mod place;
+pub(crate) mod project;
 pub(crate) mod textures;

@@ -3,7 +3,7 @@
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Button, PopupCloseBehavior, Ui, Vec2, WidgetInfo, WidgetType};
 
-use super::title;
+use super::panes::title;
 use crate::style::icons::{self, Icon};
 use crate::style::theme::{self, Palette};
 use handeye_workbench::command::{Command, Outbox};

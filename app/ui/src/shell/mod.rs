@@ -1,8 +1,13 @@
 //! The panes. Each draws a part of the model and returns what the user wants through the outbox.
 
+pub(crate) mod asked;
+pub(crate) mod capturing;
 pub(crate) mod layout;
 mod menu;
+pub(crate) mod panes;
 pub(crate) mod rail;
+pub(crate) mod reasons;
+pub(crate) mod sequence;
 mod status_bar;
 mod tiles;
 mod top_bar;
@@ -15,7 +20,7 @@ use super::style::theme::{GAP, Palette};
 use crate::live::textures::Textures;
 use crate::messages::toasts;
 use handeye_workbench::command::Outbox;
-use handeye_workbench::model::{Model, Pane, Step};
+use handeye_workbench::model::{Model, Step};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -39,26 +44,6 @@ pub fn all_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mut 
     CentralPanel::default().frame(centre).show(ui, |ui| {
         tiles::tiles_ui(ui, model, textures, layout, outbox);
     });
-}
-
-/// What is written on the tab of a pane.
-pub fn title(pane: Pane, language: Language) -> &'static str {
-    match pane {
-        Pane::Colour => tr!(language, "Colour"),
-        Pane::Depth => tr!(language, "Depth"),
-        Pane::Poses => tr!(language, "Poses"),
-        Pane::Charts => tr!(language, "Charts"),
-        Pane::Log => tr!(language, "Log"),
-        Pane::Connect => tr!(language, "Connect"),
-        Pane::Target => tr!(language, "Target"),
-        Pane::Jog => tr!(language, "Jog"),
-        Pane::Taught => tr!(language, "Taught"),
-        Pane::Result => tr!(language, "Result"),
-        Pane::Verify => tr!(language, "Verify"),
-        Pane::Export => tr!(language, "Export"),
-        Pane::Track => tr!(language, "Track"),
-        Pane::Scene => tr!(language, "3D"),
-    }
 }
 
 /// What a step is called.

@@ -4,7 +4,7 @@ use egui::{Button, Label, RichText, Sense, Ui};
 
 use handeye_arm::{JointKind, MAX_JOINTS};
 
-use crate::live::pane::waiting;
+use crate::shell::capturing::waiting;
 use crate::status::{STALE_AFTER_S, robot_age};
 use crate::style::numbers;
 use crate::style::theme::{self, CAPTION, Palette};
@@ -156,7 +156,7 @@ fn under_way(model: &Model) -> Option<Text> {
     }
     if let (true, Some(sequence)) = (model.sequence_runs, &model.sequence) {
         if let Some(guided) = &sequence.guided {
-            return Some(crate::guided::pane::under_way(model, sequence, guided));
+            return Some(crate::guided::section::under_way(model, sequence, guided));
         }
         let (number, of) = (sequence.outcomes.len() + 1, sequence.names.len());
         return sequence.current().map(|name| text!("Pose {n} of {of}: {name}", n = number, of = of, name = name));

@@ -7,26 +7,13 @@ use egui::{
 use egui::{WidgetInfo, WidgetText, WidgetType};
 use egui_tiles::{Behavior, ResizeState, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 
-use crate::capture::pane::poses_ui;
-use crate::connect::pane::connect_ui;
-use crate::export::pane::export_ui;
-use crate::live::pane::colour_ui;
-use crate::live::pane::depth_ui;
+use super::panes::{self, Panes};
 use crate::live::textures::Textures;
-use crate::messages::pane::log_ui;
-use crate::motion::pane::jog_ui;
-use crate::scene::pane::scene_ui;
 use crate::shell::layout::{Layout, Slot};
-use crate::solve::charts;
-use crate::solve::pane::result_ui;
 use crate::style::fonts;
 use crate::style::theme::{self, CARD_RADIUS, GAP, Palette};
-use crate::target::pane::target_ui;
-use crate::taught::pane::taught_ui;
-use crate::track::pane::track_ui;
-use crate::verify::pane::verify_ui;
 use handeye_workbench::command::{Command, Outbox};
-use handeye_workbench::model::{ImagePoint, Model, Moves, Pane};
+use handeye_workbench::model::{Model, Moves, Pane};
 use handeye_workbench::tr;
 
 /// Height of a row of tabs.
@@ -63,37 +50,6 @@ fn tabs_height(spacing: &Spacing) -> f32 {
     TABS.max(spacing.interact_size.y)
 }
 
-/// What the tiles are drawn from.
-struct Panes<'a> {
-    model: &'a Model,
-    textures: &'a mut Textures,
-    outbox: &'a mut Outbox,
-    /// The pixel under the pointer, from whichever image it is over.
-    pointed: Option<ImagePoint>,
-}
-
-impl Panes<'_> {
-    fn content_ui(&mut self, ui: &mut Ui, pane: Pane) {
-        let Self { model, textures, outbox, pointed } = self;
-        match pane {
-            Pane::Colour => *pointed = pointed.or(colour_ui(ui, model, &textures.live, outbox)),
-            Pane::Depth => *pointed = pointed.or(depth_ui(ui, model, &textures.live, outbox)),
-            Pane::Poses => poses_ui(ui, model, &mut textures.thumbnails, outbox),
-            Pane::Charts => charts::charts_ui(ui, model, outbox),
-            Pane::Log => log_ui(ui, model, outbox),
-            Pane::Connect => connect_ui(ui, model, outbox),
-            Pane::Target => target_ui(ui, model, outbox),
-            Pane::Jog => jog_ui(ui, model, outbox),
-            Pane::Taught => taught_ui(ui, model, outbox),
-            Pane::Result => result_ui(ui, model, outbox),
-            Pane::Verify => verify_ui(ui, model, outbox),
-            Pane::Export => export_ui(ui, model, outbox),
-            Pane::Track => track_ui(ui, model, outbox),
-            Pane::Scene => scene_ui(ui, model, outbox),
-        }
-    }
-}
-
 impl Behavior<Slot> for Panes<'_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, slot: &mut Slot) -> UiResponse {
         if let Some(pane) = slot.pane() {
@@ -101,7 +57,7 @@ impl Behavior<Slot> for Panes<'_> {
             let inside = ui.max_rect().shrink(1.0);
             ui.scope_builder(egui::UiBuilder::new().max_rect(inside).id_salt(pane), |ui| {
                 ui.set_clip_rect(ui.clip_rect().intersect(inside));
-                self.content_ui(ui, pane);
+                panes::pane_ui(ui, pane, self);
             });
         }
         UiResponse::None
@@ -112,7 +68,7 @@ impl Behavior<Slot> for Panes<'_> {
         match slot.pane() {
             // A robot that is only read is not jogged.
             Some(Pane::Jog) if self.model.moves() == Moves::Never => tr!(language, "Robot"),
-            pane => pane.map_or("", |pane| super::title(pane, language)),
+            pane => pane.map_or("", |pane| panes::title(pane, language)),
         }
         .into()
     }

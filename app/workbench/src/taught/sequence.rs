@@ -191,7 +191,7 @@ impl App {
                 self.end_stop(StopOutcome::Skipped(why.clone()));
             }
             MotionOutcome::Stopped | MotionOutcome::Failed(_) | MotionOutcome::Held(_) => {
-                self.break_off(outcome.why().cloned())
+                self.break_off(outcome.why().cloned());
             }
         }
     }

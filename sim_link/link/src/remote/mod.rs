@@ -177,6 +177,10 @@ impl ControlPort for RemoteControl {
         self.arm.sim().start_simulation().map_err(port_error)
     }
 
+    fn renew(&mut self) {
+        self.arm.sim().connection().renew();
+    }
+
     fn stop_simulation(&mut self) -> Result<(), PortError> {
         self.arm.sim().stop_simulation_and_wait().map_err(port_error)
     }
@@ -229,6 +233,10 @@ impl CameraPort for RemoteCamera {
             base_from_target_true: frame.base_from_target_true,
             clocks: None,
         })))
+    }
+
+    fn renew(&mut self) {
+        self.feed.sim().connection().renew();
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {

@@ -133,6 +133,10 @@ impl RemoteMotion {
 }
 
 impl MotionPort for RemoteMotion {
+    fn renew(&mut self) {
+        self.arm.sim().connection().renew();
+    }
+
     fn step_by_step(&mut self, on: bool) -> Result<(), PortError> {
         self.arm.sim().set_stepping(on).map_err(port_error)
     }

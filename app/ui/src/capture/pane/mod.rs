@@ -10,14 +10,15 @@ use egui::{Align, Button, DragValue, Frame, Layout, Margin, RichText, Spinner, U
 use handeye_session::CaptureId;
 
 use crate::capture::rows::{self, CaptureTable};
-use crate::guided::pane::{begin_ui, is_wanted, progress_ui};
-use crate::live::pane::stands_over_image;
-use crate::live::pane::waiting;
+use crate::guided::section::{begin_ui, is_wanted, progress_ui};
 use crate::live::textures::Thumbnails;
-use crate::motion::pane::asked_ui;
+use crate::shell::asked::asked_ui;
+use crate::shell::capturing::stands_over_image;
+use crate::shell::capturing::waiting;
+use crate::shell::reasons;
+use crate::shell::sequence;
 use crate::style::marks::{self, Marks};
 use crate::style::theme::{self, Palette, Tone};
-use crate::taught::pane::sequence;
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, Moves, PoseSequence};
@@ -45,7 +46,7 @@ pub fn poses_ui(ui: &mut Ui, model: &Model, thumbnails: &mut Thumbnails, outbox:
         ui.spacing_mut().item_spacing.y = 4.0;
         actions_ui(ui, model, &table, button, outbox);
         if let Some(hand) = &model.by_hand {
-            crate::by_hand::pane::progress_ui(ui, model, hand, outbox);
+            crate::by_hand::section::progress_ui(ui, model, hand, outbox);
         } else if let Some(sequence) = &model.sequence {
             progress_ui(ui, model, sequence, outbox);
             if sequence.guided.is_none() && !sequence.is_planned() {
@@ -108,7 +109,7 @@ fn sample_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 /// Buttons that take captures, and those for the selected ones.
 fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, height: f32, outbox: &mut Outbox) {
     let language = model.view.language;
-    let hindrance = hindrance(model);
+    let hindrance = reasons::hindrance(model);
     ui.horizontal_wrapped(|ui| {
         let mut capture_ui = |ui: &mut Ui, button: Button<'_>, name: &str, what: &str, purpose| {
             let response = ui.add_enabled(hindrance.is_none(), button).on_hover_text(what);
@@ -152,7 +153,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     let is_ours = |it: &&PoseSequence| it.guided.is_some() || it.purpose == Some(CapturePurpose::Calibrate);
     if is_wanted(model) {
         begin_ui(ui, model, hindrance, height, outbox);
-        crate::by_hand::pane::begin_ui(ui, model, hindrance, height, outbox);
+        crate::by_hand::section::begin_ui(ui, model, hindrance, height, outbox);
     }
     if let Some(sequence) = model.sequence.as_ref().filter(is_ours) {
         sequence::continue_ui(ui, model, sequence, outbox);
@@ -172,30 +173,6 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     if button.clicked() {
         outbox.send(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     }
-}
-
-/// Why no capture can be taken now.
-pub fn hindrance(model: &Model) -> Option<&'static str> {
-    let language = model.view.language;
-    if model.capture.is_some() {
-        Some(tr!(language, "A capture is under way"))
-    } else if model.sequence_runs {
-        Some(tr!(language, "The sequence is taking the captures"))
-    } else if let Some(why) = needs_robot(model) {
-        Some(why)
-    } else if !model.camera.is_connected() || model.frame.is_none() {
-        Some(tr!(language, "There are no images: connect a cell first"))
-    } else if !model.control.is_connected() {
-        Some(tr!(language, "The robot is not connected"))
-    } else {
-        None
-    }
-}
-
-/// Why no capture can be taken into this session at all.
-pub fn needs_robot(model: &Model) -> Option<&'static str> {
-    let why = || tr!(model.view.language, "This session has images without a robot: begin a new session for captures");
-    model.document().mode().is_none().then(why)
 }
 
 fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: Language, outbox: &mut Outbox) {

@@ -6,25 +6,19 @@ use egui::{
     Align, Align2, Color32, CornerRadius, Id, Layout, Rect, RichText, Sense, Spinner, Stroke, StrokeKind, Ui,
     UiBuilder, Vec2, WidgetInfo, WidgetType,
 };
-use handeye_capture::Wait;
 use handeye_session::CaptureId;
 
 use super::Shown;
 use crate::capture::rows;
+use crate::shell::capturing::{stands_over_image, waiting};
 use crate::status::STALE_AFTER_S;
 use crate::style::marks::{self, Marks};
 use crate::style::parts;
 use crate::style::theme::{CARD_RADIUS, Palette, Tone};
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
-use handeye_workbench::model::{CapturePurpose, CaptureUnderWay, CaptureWait, Model};
-use handeye_workbench::text::Text;
+use handeye_workbench::model::Model;
 use handeye_workbench::tr;
-
-/// Height of the strip over a recorded image.
-pub const STRIP: f32 = 34.0;
-/// A refusal stands over the image for so long \[s\]; after that the table of poses keeps it.
-const REFUSAL_S: f64 = 8.0;
 /// The flash of a capture \[s\].
 const FLASH_S: f64 = 0.35;
 
@@ -137,29 +131,6 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
     } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_image(model)) {
         let words = text!("No capture: {why}", why = refused.why.clone()).say(language);
         plate_ui(ui, room, Tone::Warning, &words, |_| {});
-    }
-}
-
-/// Whether the last refusal of a capture stands over the image.
-pub fn stands_over_image(model: &Model) -> bool {
-    model.refused.as_ref().is_some_and(|refused| model.now_s - refused.at_s < REFUSAL_S)
-}
-
-/// What a capture waits for, in words.
-pub fn waiting(capture: &CaptureUnderWay) -> Text {
-    let what = match capture.wait {
-        CaptureWait::Images(Wait::ForImage) => text!("waiting for an image"),
-        CaptureWait::Images(Wait::RobotMoves) => text!("waiting for the robot to stand still"),
-        CaptureWait::Images(Wait::ImageChanges) => text!("waiting for the image to come to rest"),
-        CaptureWait::Images(Wait::Averaging { done, of }) => {
-            text!("averaging images, {done} of {of}", done = done, of = of)
-        }
-        CaptureWait::Measuring => text!("measuring the board"),
-        CaptureWait::Saving => text!("saving"),
-    };
-    match capture.purpose {
-        CapturePurpose::Calibrate => text!("Capturing… {what}", what = what),
-        CapturePurpose::Verify => text!("Capturing for verification… {what}", what = what),
     }
 }
 

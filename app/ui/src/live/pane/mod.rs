@@ -2,16 +2,11 @@
 
 mod feedback;
 mod overlays;
-mod place;
-mod project;
 mod readout;
 mod shown;
 mod toolbar;
 pub(crate) mod view;
 
-pub use feedback::{stands_over_image, waiting};
-pub use place::Place;
-pub use project::{Projector, board_lines};
 pub use shown::Shown;
 
 use egui::{Align, CornerRadius, Layout, Pos2, Rect, Ui, UiBuilder, Vec2};

@@ -9,9 +9,9 @@ use handeye_geometry::targets::observation::Corner;
 use nalgebra::{Point3, Vector2};
 
 use super::Shown;
-use super::place::Place;
-use super::project::{Projector, board_lines};
 use crate::capture::rows::{self, CaptureTable};
+use crate::live::place::Place;
+use crate::live::project::{Projector, board_lines};
 use crate::style::marks::{self, Marks};
 use handeye_workbench::model::Model;
 use handeye_workbench::tr;

@@ -8,8 +8,8 @@ use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_session::CaptureId;
 use nalgebra::{Point3, Vector2};
 
-use super::place::Place;
 use super::*;
+use crate::live::place::Place;
 use crate::testing::pane_harness::{PaneHarness, PaneState};
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{
@@ -320,7 +320,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
     let frame = model.frame.as_ref().expect("live");
     let room = Rect::from_min_size(Pos2::ZERO, vec2(640.0, 480.0));
     let place = Place::new(room, vec2(640.0, 480.0), Viewport::default());
-    let projector = project::Projector {
+    let projector = crate::live::project::Projector {
         intrinsics: &calibrated.intrinsics,
         camera_from_target: calibrated.camera_from_target(&frame.info.base_from_tip.expect("the robot is known")),
         place: &place,
@@ -332,7 +332,7 @@ fn the_board_is_predicted_where_its_corners_are_seen() {
         let seen = place.screen(vec2(corner.px.x as f32, corner.px.y as f32));
         assert!(at.distance(seen) < 1.0, "{at:?} {seen:?}");
     }
-    let behind = project::Projector {
+    let behind = crate::live::project::Projector {
         camera_from_target: Pose::from_translation_xyzw([0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]),
         ..projector
     };

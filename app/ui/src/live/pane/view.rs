@@ -3,8 +3,8 @@
 use egui::{Color32, PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, TextureHandle, Ui, Vec2};
 use egui::{WidgetInfo, WidgetType};
 
-use super::place::{LARGEST_ZOOM, Place, held};
 use super::{Shown, feedback, overlays};
+use crate::live::place::{LARGEST_ZOOM, Place, held};
 use crate::status::STALE_AFTER_S;
 use crate::style::marks::{self, Marks};
 use crate::style::theme::{self, Palette};

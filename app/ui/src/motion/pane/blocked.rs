@@ -2,10 +2,11 @@
 
 use egui::Ui;
 
+use crate::shell::reasons::unknown_arm;
 use crate::style::parts;
 use crate::style::theme::Tone;
 use handeye_workbench::command::{Command, Outbox};
-use handeye_workbench::model::{ArmDoubt, Model, Moves, Simulation};
+use handeye_workbench::model::{Model, Moves, Simulation};
 use handeye_workbench::tr;
 
 /// Reasons in the language of the window.
@@ -70,24 +71,4 @@ impl Blocked {
             parts::hint_ui(ui, reason);
         }
     }
-}
-
-/// Why the arm's chain of joints is not known, so that nothing can be planned with it; `None` where it is.
-pub fn unknown_arm(model: &Model) -> Option<&'static str> {
-    let (cell, language) = (model.cell.as_ref(), model.view.language);
-    if cell.is_some_and(|cell| cell.arm.is_some()) {
-        return None;
-    }
-    Some(match cell.and_then(|cell| cell.arm_doubt) {
-        Some(ArmDoubt::Open) => tr!(
-            language,
-            "It is not known yet where the robot's joints begin and what tool it carries: let it stand at four places, each \
-             turned by 15° or more, about two axes"
-        ),
-        Some(ArmDoubt::Foreign { .. }) => tr!(
-            language,
-            "The robot's joints and poses do not agree: the log says how far they are apart, and what to do"
-        ),
-        None => tr!(language, "This arm's kinematics is not known, so no poses can be chosen: move it yourself"),
-    })
 }

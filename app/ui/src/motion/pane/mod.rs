@@ -1,7 +1,6 @@
 //! Moves the arm by hand: along axes, joint by joint, or to numbers that are typed.
 
 mod allowance;
-mod asked;
 mod blocked;
 mod hold;
 mod joints;
@@ -15,9 +14,7 @@ use egui::{Rect, ScrollArea, Sense, Ui, UiBuilder, Vec2};
 use crate::connect::drivers::typed_pose::typed_pose_ui;
 use crate::style::parts;
 use crate::style::theme::Palette;
-pub use asked::asked_ui;
 use blocked::Blocked;
-pub use blocked::unknown_arm;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Moves};
 use handeye_workbench::tr;

@@ -96,7 +96,7 @@ fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             outbox.send(Command::SetSceneView(view));
         }
     }
-    crate::keep_out::pane::header_ui(ui, model);
+    crate::keep_out::editor::header_ui(ui, model);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let font = FontId::proportional(theme::CAPTION);
         let hint = ui.painter().layout_no_wrap(hint.to_owned(), font, Palette::of(ui).weak);
@@ -121,10 +121,10 @@ fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox:
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, tr!(language, "The cell in 3D")));
     let key = ui.id().with("pointed at");
     let pointed: Option<CaptureId> = parts::remembered(ui, key);
-    let eye = Eye::new(&model.scene, crate::keep_out::pane::room_beside(ui, room));
+    let eye = Eye::new(&model.scene, crate::keep_out::editor::room_beside(ui, room));
     let mut canvas = Canvas::new(eye, Palette::of(ui).ink);
     let drawn = content::draw(&mut canvas, ui, model, table, pointed);
-    let is_drawing = crate::keep_out::pane::is_drawing(ui);
+    let is_drawing = crate::keep_out::editor::is_drawing(ui);
     if is_drawing {
         draw_box(ui, &response, &mut canvas, model, outbox);
     }
@@ -143,7 +143,7 @@ fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox:
     if !is_drawing {
         navigate(ui, &response, room, model, outbox);
     }
-    crate::keep_out::pane::editor_ui(ui, room, model, outbox);
+    crate::keep_out::editor::editor_ui(ui, room, model, outbox);
 }
 
 /// A box over the rectangle of the ground that is dragged over.
@@ -163,7 +163,7 @@ fn draw_box(ui: &Ui, response: &Response, canvas: &mut Canvas, model: &Model, ou
         parts::remember(ui, key, None::<[[f64; 2]; 2]>);
         if let Some(content) = with_drawn(&model.keep_out.content, from, to) {
             outbox.send(Command::SetKeepOut(Box::new(content)));
-            crate::keep_out::pane::set_drawing(ui, false);
+            crate::keep_out::editor::set_drawing(ui, false);
         }
     }
 }

@@ -1,13 +1,11 @@
 //! Taught poses: the places that a sequence visits, in their order.
 
-mod immovable;
 mod row;
-pub mod sequence;
 mod teach;
 
 use egui::Ui;
-pub use immovable::{immovable, unmovable};
 
+use crate::shell::sequence::sequence_ui;
 use crate::style::parts;
 use crate::style::theme::Tone;
 use handeye_wording::text;
@@ -21,7 +19,7 @@ pub fn taught_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let poses = model.taught();
     parts::body_ui(ui, "taught poses", |ui| {
         teach::teach_ui(ui, model, outbox);
-        sequence::sequence_ui(ui, model, outbox);
+        sequence_ui(ui, model, outbox);
         elsewhere_ui(ui, model, poses.len(), outbox);
         if poses.is_empty() {
             let detail = if model.has_reference_poses() {

@@ -4,7 +4,7 @@ use egui::{Align, Color32, Id, Key, Layout, Rect, RichText, Sense, Stroke, TextE
 use egui::{WidgetInfo, WidgetType};
 use handeye_dataset::taught_poses::{Goal, TaughtPose};
 
-use super::immovable;
+use crate::shell::reasons::immovable;
 use crate::style::numbers;
 use crate::style::parts::{self, Sign};
 use crate::style::theme::Palette;

@@ -3,11 +3,11 @@
 use egui::{Button, Spinner, Ui};
 use handeye_estimate::handeye::Mode;
 
-use crate::motion::pane::unknown_arm;
+use crate::shell::reasons::immovable;
+use crate::shell::reasons::unknown_arm;
+use crate::shell::sequence;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
-use crate::taught::pane::immovable;
-use crate::taught::pane::sequence;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{CapturePurpose, Model, Motion, Pane, PoseSequence};
 use handeye_workbench::tr;

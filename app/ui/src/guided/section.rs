@@ -3,11 +3,11 @@
 use egui::{Button, RichText, Spinner, Ui, Vec2};
 use handeye_plan::guided::{CHECKS, Guide};
 
-use crate::motion::pane::{asked_ui, unknown_arm};
+use crate::shell::reasons::immovable;
+use crate::shell::{asked::asked_ui, reasons::unknown_arm};
 use crate::style::marks::Marks;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
-use crate::taught::pane::immovable;
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::guided::state::{GuidedProgress, Waits};

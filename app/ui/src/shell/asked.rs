@@ -2,10 +2,10 @@
 
 use egui::{Button, RichText, Ui};
 
+use crate::shell::reasons::unmovable;
 use crate::style::marks::Marks;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
-use crate::taught::pane::unmovable;
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{Model, Motion};

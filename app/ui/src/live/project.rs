@@ -6,7 +6,7 @@ use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 use nalgebra::Point3;
 
-use super::place::Place;
+use crate::live::place::Place;
 
 /// Pieces of a line of the length of a board.
 const PIECES: usize = 12;

@@ -2,9 +2,9 @@
 
 use egui::{Button, Ui};
 
-use super::immovable;
-use crate::capture::pane::needs_robot;
-use crate::motion::pane::asked_ui;
+use crate::shell::asked::asked_ui;
+use crate::shell::reasons::immovable;
+use crate::shell::reasons::needs_robot;
 use crate::style::parts;
 use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};

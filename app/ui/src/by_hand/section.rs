@@ -3,7 +3,7 @@
 use egui::{Button, RichText, Spinner, Ui, Vec2};
 use handeye_plan::guided::CHECKS;
 
-use crate::guided::pane::error_ui;
+use crate::guided::section::error_ui;
 use crate::style::parts;
 use crate::style::theme::Palette;
 use handeye_wording::text;
