@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use handeye_coppeliasim::cell::CellPaths;
+use handeye_record::{RerunChoice, WebViewer, record};
 use handeye_workbench::app::{App, Connect, Start};
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, Model, ViewSettings};
-use handeye_workbench::rerun_log::RerunChoice;
 use handeye_workbench::text::Language;
 use handeye_workbench::worker::{Clock, Waker};
 
@@ -52,10 +52,10 @@ impl Workbench {
             keep_out: None,
             sessions: sessions.to_path_buf(),
             open,
-            rerun,
             in_browser: None,
         };
-        match App::start(start, connect, clock, waker) {
+        let started = App::start(start, connect, clock, waker);
+        match started.and_then(|mut app| record(&mut app, rerun, WebViewer::Here).map(|()| app)) {
             Ok(app) => Self { app, woken },
             Err(error) => panic!("no threads: {error}"),
         }

@@ -9,9 +9,9 @@ use super::gate::{self, Gate};
 use super::output::Output;
 use crate::rerun_arg;
 use crate::{Failure, RerunArg, shared, solve};
+use handeye_record::{Pace, RerunChoice};
 use handeye_workbench::arguments::heading;
 use handeye_workbench::model::Goal;
-use handeye_workbench::rerun_log::{Pace, RerunChoice};
 
 /// At the end of its help.
 pub const EXAMPLES: &str = "Examples:

@@ -36,16 +36,18 @@ mod track;
 
 use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
+use handeye_record::{Relay, WebViewer};
 use handeye_serve::ServeArgs;
 use handeye_ui::GuiArgs;
 
 pub use failure::Failure;
 use handeye_workbench::arguments::ObjectArgs;
-use handeye_workbench::arguments::RerunArg;
+use rerun_arg::RerunArg;
 
 /// The least that is to be known.
 const EXAMPLES: &str = "Examples, the first of which opens the window:
@@ -65,14 +67,23 @@ struct Cli {
     command: Option<Command>,
 }
 
+/// What is recorded while it is looked at.
+#[derive(Debug, Default, clap::Args)]
+struct Recorded<T: clap::Args> {
+    #[command(flatten)]
+    window: T,
+    #[command(flatten)]
+    rerun: RerunArg,
+}
+
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Open the workbench (the default).
     #[command(after_help = "Examples:\n  handeye gui --scene panda\n  handeye gui --connect tcp://192.168.0.7:23000")]
-    Gui(GuiArgs),
+    Gui(Recorded<GuiArgs>),
     /// Show the workbench in a browser, here or on another machine, until Ctrl-C (docs/reference/browser.md).
     #[command(after_help = "Examples:\n  handeye serve\n  handeye serve --bind 0.0.0.0 --port 8600")]
-    Serve(ServeArgs),
+    Serve(Recorded<ServeArgs>),
     /// Serve the built-in cell over the ZeroMQ remote API until Ctrl-C.
     #[command(after_help = "Examples:\n  handeye cell --port 0 --scene realistic --seed 7")]
     Cell(cell::CellArgs),
@@ -133,11 +144,10 @@ pub fn main() -> ExitCode {
         }
     };
     start_logging(cli.quiet);
-    let result = match cli.command.unwrap_or_else(|| Command::Gui(GuiArgs::default())) {
-        Command::Gui(args) => {
-            rerun_arg::check(&args.rerun).and_then(|()| handeye_ui::run(args).map_err(Failure::failed))
-        }
-        Command::Serve(args) => {
+    let result = match cli.command.unwrap_or_else(|| Command::Gui(Recorded::default())) {
+        Command::Gui(Recorded { window, rerun }) => rerun_arg::of_window(&rerun, WebViewer::Here)
+            .and_then(|begin| handeye_ui::run(window, begin).map_err(Failure::failed)),
+        Command::Serve(Recorded { window: args, rerun }) => {
             let is_local = args.bind.is_loopback();
             let announce = |url: &str| {
                 if !is_local {
@@ -150,7 +160,9 @@ pub fn main() -> ExitCode {
                 // Nobody may listen to it any more: it is served all the same.
                 let _told = out::line(format_args!("the workbench is at {url}")).is_ok();
             };
-            rerun_arg::check(&args.gui.rerun).and_then(|()| handeye_serve::run(args, announce).map_err(Failure::failed))
+            let relay = Arc::<Relay>::default();
+            rerun_arg::of_window(&rerun, WebViewer::Relayed(Arc::clone(&relay)))
+                .and_then(|begin| handeye_serve::run(args, begin, relay, announce).map_err(Failure::failed))
         }
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),

@@ -6,8 +6,9 @@ use handeye_link::RawFrame;
 use handeye_session::Store;
 use image::RgbImage;
 
+use handeye_record::Recorder;
 use handeye_workbench::model::{CellFacts, ColouredDepth, FrameImages, FrameInfo, LiveFrame};
-use handeye_workbench::rerun_log::{Entry, Recorder};
+use handeye_workbench::recording::{Entry, Recording as _};
 
 /// The cell and what it publishes of itself.
 pub fn cell(recorder: &Recorder, facts: &CellFacts) {

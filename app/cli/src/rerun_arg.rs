@@ -1,15 +1,19 @@
-//! The recording of a command: begun as `--rerun` asks, ended after the result.
+//! The option `--rerun` of every command that has something to show, and the recording: begun as it asks, ended after the
+//! result.
 
 use std::ffi::OsString;
 use std::time::Duration;
 
 use anyhow::anyhow;
+use clap::Args;
 use handeye_geometry::progress::CancelToken;
 
 use crate::{Failure, out};
-use handeye_workbench::arguments::RerunArg;
+use handeye_record::{Pace, Recorder, RecorderOptions, RerunChoice, WebViewer, record};
+use handeye_ui::opening::Begin;
+use handeye_workbench::arguments::heading;
 use handeye_workbench::model::ViewerState;
-use handeye_workbench::rerun_log::{Pace, Recorder, RecorderOptions, RerunChoice, WebViewer};
+use handeye_workbench::recording::Recording as _;
 use handeye_workbench::text::Language;
 
 /// How long a command waits at its end for what is still to be written. A pipe to a viewer elsewhere may be slow.
@@ -17,6 +21,28 @@ const DEADLINE: Duration = Duration::from_secs(20);
 
 /// Between two looks at the viewer.
 const LOOK: Duration = Duration::from_millis(50);
+
+/// The option `--rerun`.
+#[derive(Debug, Clone, Default, Args)]
+pub struct RerunArg {
+    /// Show it in Rerun: in the native viewer (spawn), in a browser (web), or in a viewer that runs (connect URL); or
+    /// record it into a file (save FILE), or not at all (off).
+    // One value: the second word is joined to the first before anything is parsed, see `joined`.
+    #[arg(long, value_name = "spawn|web|connect URL|save FILE|off", value_parser = RerunChoice::parse, help_heading = heading::OUTPUT)]
+    rerun: Option<RerunChoice>,
+}
+
+impl RerunArg {
+    /// What was asked for, or else what the command does by itself.
+    pub fn choice(&self, otherwise: RerunChoice) -> RerunChoice {
+        self.rerun.clone().unwrap_or(otherwise)
+    }
+
+    /// What was asked for.
+    pub fn asked(&self) -> Option<&RerunChoice> {
+        self.rerun.as_ref()
+    }
+}
 
 /// The arguments with `--rerun save FILE` and `--rerun connect URL` as one argument each, so that `--rerun web PATH` does
 /// not take PATH as well.
@@ -63,13 +89,23 @@ fn is_option(argument: &OsString) -> bool {
 ///
 /// # Errors
 /// When it cannot.
-pub fn check(argument: &RerunArg) -> Result<(), Failure> {
+fn check(argument: &RerunArg) -> Result<(), Failure> {
     let Some(RerunChoice::Save(file)) = argument.asked() else { return Ok(()) };
     let opened = std::fs::OpenOptions::new().create(true).append(true).open(file);
     opened.map(drop).map_err(|error| {
         let file = file.display();
         Failure::unusable(anyhow!("{file} cannot be written: {error}; name a file in a folder that is there"))
     })
+}
+
+/// Has a window recorded, beside its session if nothing else was asked for.
+///
+/// # Errors
+/// When the file that was named cannot be written.
+pub fn of_window(argument: &RerunArg, web: WebViewer) -> Result<Begin, Failure> {
+    check(argument)?;
+    let choice = argument.choice(RerunChoice::Record);
+    Ok(Box::new(move |app| Ok(record(app, choice, web)?)))
 }
 
 /// Begins the recording of a command that ends.
@@ -135,7 +171,7 @@ pub fn finish(mut recorder: Recorder, cancel: &CancelToken) -> Result<(), Failur
     }
     let mut said = Vec::new();
     let deadline = if failed.is_some() { Duration::from_secs(2) } else { DEADLINE };
-    recorder.drain(|event| said.push(event));
+    recorder.drain(&mut |event| said.push(event));
     let complete = recorder.finish(deadline);
     for event in said {
         if let handeye_workbench::command::Event::Notice { text, .. } = event {

@@ -18,10 +18,11 @@ use handeye_session::{self as session, CaptureId, CaptureRecord, Document, Sessi
 
 use super::output::Output;
 use super::{Failure, out};
+use handeye_record::Recorder;
 use handeye_workbench::model::{Goal, JobId, Observed, Solved, Step, Truth};
 use handeye_workbench::observe::{ObserveError, observe, observe_session};
+use handeye_workbench::recording::{Entry, Recording as _};
 use handeye_workbench::report;
-use handeye_workbench::rerun_log::{Entry, Recorder};
 use handeye_workbench::session::start;
 use handeye_workbench::worker::{self, SolveJob};
 

@@ -22,12 +22,12 @@ use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_driver::fake::{Fake, FakeOptions, FakePart};
 use handeye_geometry::frames::{Base, Camera, Pose, Tip};
 use handeye_link::limits;
+use handeye_record::RerunChoice;
 use handeye_server::{CellConfig, CellServer};
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{
     Axis, CapturePurpose, CellSource, Drivers, Jog, JogFrame, JogSettings, JogStep, Model, Motion, SolveStatus,
 };
-use handeye_workbench::rerun_log::RerunChoice;
 use window::Drawn;
 
 /// Longest wait for anything that a person waits for.

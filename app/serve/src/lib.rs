@@ -29,7 +29,8 @@ use std::sync::Arc;
 use anyhow::Context as _;
 
 use handeye_http::door::{Door, Limits};
-use handeye_ui::opening::Opening;
+use handeye_record::Relay;
+use handeye_ui::opening::{Begin, Opening};
 use handeye_ui::signals::Signals;
 use handeye_workbench::app::{InBrowser, Reach};
 
@@ -51,20 +52,21 @@ const LIMITS: Limits = Limits {
     answer: std::time::Duration::from_mins(10),
 };
 
-/// Serves the workbench until it is asked to end. `announce` is told the address to open, once it can be.
+/// Serves the workbench until it is asked to end, after `begin` with its application, and the recording beside it.
+/// `announce` is told the address to open, once it can be.
 ///
 /// # Errors
 /// When the port is taken or the address is none of this machine, and as for the window.
-pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
+pub fn run(args: ServeArgs, begin: Begin, recording: Arc<Relay>, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
     let ServeArgs { bind, port, allow, gui } = args;
-    let opening = Opening::read(gui)?;
+    let opening = Opening::read(gui, begin)?;
     let address = SocketAddr::new(bind, port);
     let access = Access::of(bind)?;
     let mut folders = vec![opening.sessions()];
     folders.extend(opening.session().map(std::path::Path::to_path_buf));
     folders.extend(allow);
     let reach = Reach::new(folders).with_uploads(upload::folder(&opening.sessions())).with_drivers(opening.drivers());
-    let shown = InBrowser { reach, recording: Arc::default(), stop: Arc::default() };
+    let shown = InBrowser { reach, stop: Arc::default() };
 
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)
@@ -74,7 +76,7 @@ pub fn run(args: ServeArgs, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
         .context("there are no threads to serve from")?;
     let (hub, wakes) = Hub::new(Arc::clone(&shown.stop));
     let hub = Arc::new(hub);
-    let site = Site::new(access, Arc::clone(&hub), shown.clone(), &opening.sessions());
+    let site = Site::new(access, Arc::clone(&hub), shown.clone(), recording, &opening.sessions());
     let site = Arc::new(site);
     let answering = Arc::clone(&site);
     let door = Door::at(address, runtime.handle(), LIMITS, move |request| {

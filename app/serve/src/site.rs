@@ -25,8 +25,8 @@ use super::hub::Hub;
 use super::socket;
 use super::upload::{UploadError, Uploads};
 use handeye_http::door::{asked_from, plain};
+use handeye_record::Relay;
 use handeye_workbench::app::InBrowser;
-use handeye_workbench::rerun_log::Relay;
 
 /// What the browser may load and where it may connect to: this server, and nothing else.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; \
@@ -46,17 +46,18 @@ pub struct Site {
     access: Access,
     hub: Arc<Hub>,
     shown: InBrowser,
+    recording: Arc<Relay>,
     uploads: Arc<Uploads>,
     downloads: Arc<Semaphore>,
     recordings: Arc<Semaphore>,
 }
 
 impl Site {
-    /// For a window, with uploads into a folder of the sessions.
-    pub fn new(access: Access, hub: Arc<Hub>, shown: InBrowser, sessions: &Path) -> Self {
+    /// For a window and its recording, with uploads into a folder of the sessions.
+    pub fn new(access: Access, hub: Arc<Hub>, shown: InBrowser, recording: Arc<Relay>, sessions: &Path) -> Self {
         let uploads = Arc::new(Uploads::new(sessions));
         let [downloads, recordings] = [DOWNLOADS, RECORDINGS].map(|places| Arc::new(Semaphore::new(places)));
-        Self { access, hub, shown, uploads, downloads, recordings }
+        Self { access, hub, shown, recording, uploads, downloads, recordings }
     }
 
     /// What a person opens.
@@ -94,7 +95,7 @@ impl Site {
             let Ok(place) = Arc::clone(&self.recordings).try_acquire_owned() else {
                 return plain(StatusCode::SERVICE_UNAVAILABLE, "The recording is read by too many already.\n");
             };
-            return until_its_end(self.shown.recording.answer(request).await, place);
+            return until_its_end(self.recording.answer(request).await, place);
         }
         let path = request.uri().path().to_owned();
         match (request.method(), path.as_str()) {

@@ -3,7 +3,7 @@
 use clap::Args;
 use handeye_cell::scene::SceneChoice;
 
-use handeye_workbench::arguments::{ObjectArgs, RerunArg, heading};
+use handeye_workbench::arguments::{ObjectArgs, heading};
 
 /// Options of the workbench.
 #[derive(Debug, Args, Default)]
@@ -30,7 +30,4 @@ pub struct GuiArgs {
     /// Session folder to open, or to create.
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     pub session: Option<std::path::PathBuf>,
-    /// Where the recording goes; beside the session if not given.
-    #[command(flatten)]
-    pub rerun: RerunArg,
 }

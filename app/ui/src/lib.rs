@@ -58,13 +58,13 @@ pub const SIZE: [f32; 2] = [1440.0, 900.0];
 /// Below this size panes no longer have room \[points\].
 pub const LEAST_SIZE: [f32; 2] = [1024.0, 700.0];
 
-/// Opens the window and returns when it is closed, by a person or by a signal that asks for the end.
+/// Opens the window, after `begin` with its application, and returns when it is closed, by a person or by a signal that asks for the end.
 ///
 /// # Errors
-/// When no window can be opened, most likely because there is no screen.
+/// When `begin` fails, or no window can be opened, most likely because there is no screen.
 #[cfg(feature = "window")]
-pub fn run(args: GuiArgs) -> anyhow::Result<()> {
-    let opening = opening::Opening::read(args)?;
+pub fn run(args: GuiArgs, begin: opening::Begin) -> anyhow::Result<()> {
+    let opening = opening::Opening::read(args, begin)?;
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_app_id(handeye_workbench::settings::FOLDER)
@@ -95,6 +95,6 @@ pub fn run(args: GuiArgs) -> anyhow::Result<()> {
 /// # Errors
 /// Always.
 #[cfg(not(feature = "window"))]
-pub fn run(_args: GuiArgs) -> anyhow::Result<()> {
+pub fn run(_args: GuiArgs, _begin: opening::Begin) -> anyhow::Result<()> {
     anyhow::bail!("this program was built without a window: `handeye serve` shows it in a browser")
 }

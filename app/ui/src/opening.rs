@@ -13,7 +13,6 @@ use super::{GuiArgs, widget_list};
 use handeye_workbench::app::{App, Connect, InBrowser, Start};
 use handeye_workbench::command::Event;
 use handeye_workbench::model::{CellSource, Drivers};
-use handeye_workbench::rerun_log::RerunChoice;
 use handeye_workbench::settings::{self, Settings, SettingsFile, Warning};
 use handeye_workbench::worker::Clock;
 
@@ -28,14 +27,18 @@ pub struct Opening {
     warnings: Vec<Warning>,
     source: CellSource,
     objects: CellPaths,
+    begin: Begin,
 }
+
+/// What is done with the application before anything happens in it, as to have it recorded.
+pub type Begin = Box<dyn FnOnce(&mut App) -> anyhow::Result<()>>;
 
 impl Opening {
     /// Reads the settings; what cannot be read there is said in the window.
     ///
     /// # Errors
     /// When there are boxes that the arm keeps out of, or a scene that was asked for, and they cannot be read.
-    pub fn read(args: GuiArgs) -> anyhow::Result<Self> {
+    pub fn read(args: GuiArgs, begin: Begin) -> anyhow::Result<Self> {
         let (file, settings, warnings) = SettingsFile::open(settings::default_path(), variable);
         let drivers = Drivers { robot: args.driver.clone(), camera: args.camera_driver.clone() };
         let source = match (&args.connect, &args.scene) {
@@ -53,7 +56,7 @@ impl Opening {
             // A window that moves the arm without them would be worse than none.
             Surroundings::read(file)?;
         }
-        Ok(Self { args, file, settings, warnings, source, objects })
+        Ok(Self { args, file, settings, warnings, source, objects, begin })
     }
 
     /// The session to open, as the command line has it.
@@ -78,7 +81,7 @@ impl Opening {
     /// Starts the workers and puts a window over them.
     ///
     /// # Errors
-    /// When a thread cannot be started.
+    /// When a thread cannot be started, or `begin` fails.
     pub fn window(
         self,
         ctx: &egui::Context,
@@ -86,7 +89,7 @@ impl Opening {
         layout: Layout,
         in_browser: Option<InBrowser>,
     ) -> anyhow::Result<Window> {
-        let Self { args, file, settings, warnings, source, objects } = self;
+        let Self { args, file, settings, warnings, source, objects, begin } = self;
         let waker = waker_of(ctx)?;
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
@@ -100,10 +103,10 @@ impl Opening {
             keep_out: args.keep_out.or_else(|| settings::default_path().map(|path| path.with_file_name(KEEP_OUT_FILE))),
             sessions: settings.sessions_folder(),
             open: args.session,
-            rerun: args.rerun.choice(RerunChoice::Record),
             in_browser,
         };
         let mut app = App::start(start, connect, clock, waker)?;
+        begin(&mut app)?;
         app.absorb(Event::Recent(remembered.recent));
         for warning in warnings {
             app.absorb(warning.into());

@@ -213,7 +213,7 @@ impl Window {
                 // A browser has the file manager of another machine.
                 Command::OpenFolder(folder) if self.app.model().in_browser => ctx.open_url(download(&folder)),
                 Command::OpenRerun if self.app.model().in_browser => {
-                    ctx.open_url(egui::OpenUrl::new_tab(handeye_workbench::rerun_log::RELAY_PATH));
+                    ctx.open_url(egui::OpenUrl::new_tab(handeye_workbench::recording::BROWSER_PATH));
                     self.apply(Command::OpenRerun);
                 }
                 command => self.apply(command),

@@ -1,7 +1,7 @@
-//! The workbench without a window: the model, what may change it, the threads that work for it, and the recording.
+//! The workbench without a window: the model, what may change it, the threads that work for it.
 //!
 //! Data flows in one direction: workers report events, [`app::App`] changes the model, and whoever shows the model returns commands.
-//! Never depends on egui, a screen, or a subcommand.
+//! Never depends on egui, a screen, Rerun, or a subcommand.
 
 pub mod app;
 pub mod arguments;
@@ -19,8 +19,8 @@ pub mod messages;
 pub mod model;
 pub mod motion;
 pub mod observe;
+pub mod recording;
 pub mod report;
-pub mod rerun_log;
 pub mod sample;
 pub mod scene;
 pub mod session;

@@ -80,6 +80,21 @@ fn a_program_that_estimates_is_built_without_formats_windows_and_opencv() {
 }
 
 #[test]
+fn the_workbench_is_built_without_a_window_and_the_window_without_rerun() {
+    for (package, foreign) in [
+        ("handeye_workbench", ["rerun", "egui", "hyper", "tonic"].as_slice()),
+        ("handeye_ui", ["rerun", "hyper", "tonic"].as_slice()),
+        ("handeye_record", ["egui"].as_slice()),
+    ] {
+        let built = built_with(package);
+        assert!(built.contains("handeye_session"), "{built:?}");
+        for name in foreign {
+            assert!(!built.contains(*name), "{package} is built with {name}");
+        }
+    }
+}
+
+#[test]
 fn the_description_of_a_crate_is_there_for_a_registry() {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--no-deps", "--locked", "--offline"])

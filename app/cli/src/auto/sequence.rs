@@ -12,9 +12,9 @@ use super::super::late::Late;
 use super::super::open_cell::{OpenCell, port_failure};
 use super::super::{Failure, record};
 use super::poses::Plan;
+use handeye_record::Recorder;
 use handeye_workbench::capture::{self, CaptureEnd, CaptureRequest, Measured};
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, LiveFrame, RefusalKind};
-use handeye_workbench::rerun_log::Recorder;
 use handeye_workbench::text::{Language, Text};
 
 /// How often a conversation that broke on the way to one pose is taken up again.

@@ -16,9 +16,9 @@ use crate::cell_choice::CellChoice;
 use crate::open_cell::OpenCell;
 use crate::rerun_arg;
 use crate::{Failure, RerunArg, out, solve};
+use handeye_record::{Pace, RerunChoice};
 use handeye_workbench::arguments::heading;
 use handeye_workbench::model::{FollowWish, Tracked};
-use handeye_workbench::rerun_log::{Pace, RerunChoice};
 use live::{Job, Summary, Taken, Task};
 
 /// At the end of its help.

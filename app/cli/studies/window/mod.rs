@@ -7,10 +7,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use handeye_coppeliasim::cell::CellPaths;
+use handeye_record::{RerunChoice, WebViewer, record};
 use handeye_ui::{Layout, Window};
 use handeye_workbench::app::{App, Connect, Start};
 use handeye_workbench::model::{CellSource, ViewSettings};
-use handeye_workbench::rerun_log::RerunChoice;
 use handeye_workbench::settings::SettingsFile;
 use handeye_workbench::worker::{Clock, Waker};
 
@@ -46,10 +46,10 @@ impl Drawn {
             keep_out: None,
             open: Some(sessions.join("session")),
             sessions: sessions.clone(),
-            rerun,
             in_browser: None,
         };
-        let app = App::start(start, connect, clock, waker)?;
+        let mut app = App::start(start, connect, clock, waker)?;
+        record(&mut app, rerun, WebViewer::Here)?;
         let ctx = egui::Context::default();
         let window = Window::new(app, Layout::default(), SettingsFile::default(), &ctx);
         Ok(Self { window, ctx, began, sessions, times_ms: Vec::new(), shapes: 0 })

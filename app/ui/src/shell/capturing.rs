@@ -5,8 +5,6 @@ use handeye_wording::text;
 use handeye_workbench::model::{CapturePurpose, CaptureUnderWay, CaptureWait, Model};
 use handeye_workbench::text::Text;
 
-/// Height of the strip over a recorded image.
-pub const STRIP: f32 = 34.0;
 /// A refusal stands over the image for so long \[s\]; after that the table of poses keeps it.
 const REFUSAL_S: f64 = 8.0;
 

@@ -19,7 +19,6 @@ use handeye_workbench::model::{
     CellSource, ColouredDepth, FrameImages, FrameInfo, Link, LinkState, Model, Pane, RobotState, Simulation,
     ViewSettings,
 };
-use handeye_workbench::rerun_log::RerunChoice;
 use handeye_workbench::settings::SettingsFile;
 use handeye_workbench::text::Text;
 use handeye_workbench::worker::fake::FakeCell;
@@ -66,7 +65,6 @@ impl Silent {
             objects: CellPaths::default(),
             keep_out: None,
             sessions: folder.path().to_path_buf(),
-            rerun: RerunChoice::Off,
             open: None,
             in_browser: None,
         };

@@ -41,7 +41,8 @@ impl App {
         }
         self.workers.shut_down(before(by, FOR_FILES).saturating_duration_since(Instant::now()));
         self.desk.end(by);
-        if !self.recorder.finish(by.saturating_duration_since(Instant::now())) {
+        let left = by.saturating_duration_since(Instant::now());
+        if self.recording.as_mut().is_some_and(|recording| !recording.finish(left)) {
             tracing::warn!("the end of the recording for Rerun was not written in time");
         }
     }

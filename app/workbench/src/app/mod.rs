@@ -16,7 +16,8 @@ use handeye_files::bounds::Bounds;
 
 use crate::command::{Command, Event, Outbox};
 use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
-use crate::rerun_log::{Pace, Recorder, RecorderOptions, Relay, RerunChoice, WebViewer};
+use crate::recording::Recording;
+use crate::recording::recorded::Recorded;
 use crate::settings::SettingsWrite;
 use crate::worker::{Cell, Clock, FileTask, SessionThreads, StopLine, Waker, Workers};
 use handeye_wording::text;
@@ -44,8 +45,6 @@ pub struct Start {
     pub sessions: PathBuf,
     /// A session or data set to open at once; where there is none, a session is begun there.
     pub open: Option<PathBuf>,
-    /// Where the recording for Rerun goes.
-    pub rerun: RerunChoice,
     /// What can be reached where the window is shown in browsers; nothing is then opened on the screen of this machine.
     pub in_browser: Option<InBrowser>,
 }
@@ -55,8 +54,6 @@ pub struct Start {
 pub struct InBrowser {
     /// What can be reached from there.
     pub reach: Reach,
-    /// Where the recording is found for the viewer that is shown beside it.
-    pub recording: Arc<Relay>,
     /// What stops the arm, for the threads that listen to pages.
     pub stop: Arc<StopLine>,
 }
@@ -74,8 +71,9 @@ pub struct App {
     pub(crate) numbers: Numbers,
     /// The question that the solver was asked last.
     pub(crate) asked: Option<crate::solve::question::Question>,
-    pub(crate) recorder: Recorder,
-    pub(crate) recorded: crate::rerun_log::recorded::Recorded,
+    /// Nothing is recorded without.
+    pub(crate) recording: Option<Box<dyn Recording>>,
+    pub(crate) recorded: Recorded,
     /// Until when everything has to be over, once the application ends.
     pub(crate) leave_by: Option<Instant>,
     /// Stops of other threads that were taken note of.
@@ -104,16 +102,9 @@ impl App {
     /// Starts the workers; they connect by themselves.
     ///
     /// # Errors
-    /// When the system has no more threads, or the file of the recording cannot be made.
+    /// When the system has no more threads.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
-        let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, rerun, in_browser } = start;
-        let recorder = Recorder::start(RecorderOptions {
-            choice: rerun,
-            pace: Pace::Live,
-            beside_session: true,
-            web: in_browser.as_ref().map_or(WebViewer::Here, |shown| WebViewer::Relayed(Arc::clone(&shown.recording))),
-            waker: Arc::clone(&waker),
-        })?;
+        let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, in_browser } = start;
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
         let stop = in_browser.as_ref().map(|shown| Arc::clone(&shown.stop)).unwrap_or_default();
         let connector = connect(&source, &objects);
@@ -124,7 +115,6 @@ impl App {
         let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
         let model = Model { keep_out, ..model };
         let numbers = Numbers::default();
-        let recorded = crate::rerun_log::recorded::Recorded::default();
         let mut app = Self {
             model,
             workers,
@@ -134,8 +124,8 @@ impl App {
             waker,
             numbers,
             asked: None,
-            recorder,
-            recorded,
+            recording: None,
+            recorded: Recorded::default(),
             leave_by: None,
             outside_stops: 0,
             reach: in_browser.map(|shown| shown.reach),
@@ -170,7 +160,9 @@ impl App {
         let mut events = Vec::new();
         self.workers.drain(|event| events.push(event));
         self.desk.drain(|event| events.push(event));
-        self.recorder.drain(|event| events.push(event));
+        if let Some(recording) = &self.recording {
+            recording.drain(&mut |event| events.push(event));
+        }
         for event in events {
             self.absorb(event);
         }

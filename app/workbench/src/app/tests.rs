@@ -47,7 +47,6 @@ fn bench_with(connect: Connect) -> Bench {
         keep_out: None,
         sessions: sessions.path().to_path_buf(),
         open: None,
-        rerun: RerunChoice::Off,
         in_browser: None,
     };
     Bench { app: App::start(start, connect, clock, waker).expect("threads"), _sessions: sessions }

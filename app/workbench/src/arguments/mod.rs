@@ -2,9 +2,7 @@
 
 pub mod heading;
 mod object_arg;
-mod rerun_arg;
 mod target_words;
 
 pub use object_arg::ObjectArgs;
-pub use rerun_arg::RerunArg;
 pub use target_words::{DescribedTarget, of_text};

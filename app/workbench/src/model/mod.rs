@@ -34,7 +34,7 @@ pub use crate::live::state::{
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{AskedMove, JogSettings, JogStep, Motion, MotionId, MotionRequest};
-pub use crate::rerun_log::state::{RerunState, ViewerState};
+pub use crate::recording::state::{RerunState, ViewerState};
 pub use crate::session::state::{
     FolderEntry, FolderKind, FolderListing, Observed, PoseSequence, RecentSession, Review, SessionState, StopOutcome,
 };

@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 use handeye_capture::Wait;
 use handeye_coppeliasim::cell::{Arm, CellPaths};
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, MotionLimits, SimulationState};
+use handeye_record::RerunChoice;
 use handeye_session::Session;
 use handeye_tests::CellProcess;
 use handeye_tests::process::{end_of, signal, start, until_said};
 use handeye_tests::workbench::Workbench;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
-use handeye_workbench::rerun_log::RerunChoice;
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -6,10 +6,10 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use handeye_record::RerunChoice;
 use handeye_tests::workbench::Workbench;
 use handeye_workbench::command::Command as Click;
 use handeye_workbench::model::{CellSource, Step, ViewerState};
-use handeye_workbench::rerun_log::RerunChoice;
 
 /// Set for the process in which threads are counted.
 const COUNTED: &str = "HANDEYE_TEST_COUNTED";

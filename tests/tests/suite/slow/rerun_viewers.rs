@@ -9,13 +9,13 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use handeye_geometry::testing::{Need, programs, python, skip};
+use handeye_record::RerunChoice;
 use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::watch::Watch;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{CellProcess, handeye_binary, process};
 use handeye_workbench::command::Command as WorkbenchCommand;
 use handeye_workbench::model::{CellSource, Model, ViewerState};
-use handeye_workbench::rerun_log::RerunChoice;
 
 /// Longer than anything that a test waits for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);

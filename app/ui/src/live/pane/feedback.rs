@@ -19,6 +19,9 @@ use handeye_wording::text;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::Model;
 use handeye_workbench::tr;
+
+/// Height of the strip over a recorded image.
+pub const STRIP: f32 = 34.0;
 /// The flash of a capture \[s\].
 const FLASH_S: f64 = 0.35;
 

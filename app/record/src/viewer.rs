@@ -1,0 +1,206 @@
+//! Opening viewers, each on a thread of its own: programs are started and looked after, which takes its time.
+
+use std::process::Child;
+use std::sync::Arc;
+use std::thread::Builder;
+use std::time::Duration;
+
+use rerun::sink::{GrpcSink, GrpcSinkConnectionState};
+
+use super::recorder::WebViewer;
+use super::serving::Servers;
+use super::shared::{Shared, Viewers};
+use super::stream::{SharedSink, Target};
+use super::{browser, native};
+use handeye_wording::text;
+use handeye_workbench::model::{Severity, ViewerState};
+use handeye_workbench::recording::BROWSER_PATH;
+use handeye_workbench::text::Text;
+
+/// A native viewer that ends this soon has not been able to show anything.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// A viewer that is connected to has answered by then.
+const CONNECT: Duration = Duration::from_secs(10);
+
+/// Between two looks at a connection.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Which viewer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ViewerWish {
+    /// The native one, or the web viewer where there is none.
+    Best,
+    /// The native one.
+    Native,
+    /// The web viewer.
+    Web,
+    /// One that runs already, at this address.
+    Connect(String),
+}
+
+/// Opens a viewer unless one is being opened.
+pub(super) fn open(shared: &Arc<Shared>, wish: ViewerWish) {
+    if let Err(state) = shared.reports.begin_opening() {
+        let text = match state {
+            ViewerState::Native => text!("The Rerun viewer is open already"),
+            ViewerState::Connected { url } => text!("The recording goes to the viewer at {url} already", url = url),
+            _ => text!("The Rerun viewer is being opened"),
+        };
+        shared.reports.notice(Severity::Info, text);
+        return;
+    }
+    let work = Arc::clone(shared);
+    let wish = if matches!(shared.web, WebViewer::Relayed(_)) { ViewerWish::Web } else { wish };
+    let started = Builder::new().name("rerun-opener".to_owned()).spawn(move || {
+        let opened = match wish {
+            ViewerWish::Best => work.native().or_else(|why| {
+                tracing::info!("{}", why.say(handeye_workbench::text::Language::English));
+                work.web()
+            }),
+            ViewerWish::Native => work.native(),
+            ViewerWish::Web => work.web(),
+            ViewerWish::Connect(url) => work.connect(&url),
+        };
+        if let Err(why) = opened {
+            work.failed(why);
+        }
+    });
+    if let Err(error) = started {
+        shared.failed(text!("No viewer was opened: {error}", error = error));
+    }
+}
+
+impl Shared {
+    fn failed(&self, why: Text) {
+        self.reports.notice(Severity::Warning, why.clone());
+        self.reports.set_viewer(ViewerState::Failed(why));
+    }
+
+    /// The addresses from which viewers read.
+    fn serve(&self) -> Result<[String; 2], Text> {
+        let mut viewers = self.viewers();
+        if let Some(servers) = &viewers.servers {
+            return Ok(servers.urls());
+        }
+        let servers = Servers::start().map_err(|error| text!("No viewer was opened: {error}", error = error))?;
+        self.write_to_viewers(servers.target());
+        let urls = servers.urls();
+        viewers.servers = Some(servers);
+        Ok(urls)
+    }
+
+    /// The address of the page with the web viewer.
+    fn page(&self) -> Result<String, Text> {
+        let no_viewer = |error: std::io::Error| text!("No viewer was opened: {error}", error = error);
+        let mut viewers = self.viewers();
+        let Viewers { servers, page } = &mut *viewers;
+        if let Some(page) = page {
+            return Ok(page.url().to_owned());
+        }
+        let served = servers.as_ref().ok_or_else(|| no_viewer(std::io::Error::other("the servers have ended")))?;
+        Ok(page.insert(served.page().map_err(no_viewer)?).url().to_owned())
+    }
+
+    fn native(&self) -> Result<(), Text> {
+        let program = native::find()?;
+        let urls = self.serve()?;
+        let cannot = |error: std::io::Error| {
+            text!(
+                "The native Rerun viewer {program} does not start: {error}",
+                program = program.display(),
+                error = error
+            )
+        };
+        let mut child = native::start(&program, &urls).map_err(cannot)?;
+        if let Some(status) = native::wait(&mut child, GRACE, || self.has_ended()).map_err(cannot)?
+            && !status.success()
+        {
+            return Err(text!(
+                "The native Rerun viewer ended at once ({status}): it needs a screen and Vulkan or OpenGL",
+                status = status
+            ));
+        }
+        self.reports.set_viewer(ViewerState::Native);
+        self.watch(child);
+        Ok(())
+    }
+
+    /// Waits until the user closes the viewer.
+    fn watch(&self, mut child: Child) {
+        let ended = native::wait(&mut child, Duration::MAX, || self.has_ended());
+        tracing::debug!(?ended, "the native viewer is no longer looked after");
+        if self.has_ended() {
+            return;
+        }
+        let mut viewers = self.viewers();
+        let page = viewers.page.as_ref().map(|page| page.url().to_owned());
+        if let Some(url) = page {
+            self.reports.set_viewer(ViewerState::Web { url });
+            return;
+        }
+        // Nobody looks: writing for viewers would only cost time.
+        self.leave_viewers();
+        viewers.servers = None;
+        drop(viewers);
+        self.reports.set_viewer(ViewerState::Closed);
+    }
+
+    fn web(&self) -> Result<(), Text> {
+        self.serve()?;
+        if let WebViewer::Relayed(relay) = &self.web {
+            let viewers = self.viewers();
+            let served = viewers.servers.as_ref().map_or(Ok(()), |servers| servers.relay(relay));
+            served.map_err(|error| text!("No viewer was opened: {error}", error = error))?;
+            self.reports.set_viewer(ViewerState::Web { url: BROWSER_PATH.to_owned() });
+            return Ok(());
+        }
+        let url = self.page()?;
+        self.reports.set_viewer(ViewerState::Web { url: url.clone() });
+        if matches!(self.web, WebViewer::Here) {
+            let opened = browser::open(&url);
+            let text = if opened {
+                text!("The recording is shown in the browser: {url}", url = url)
+            } else {
+                text!("The recording is shown at {url}: open it in a browser", url = url)
+            };
+            self.reports.notice(Severity::Info, text);
+            if !opened {
+                self.reports.no_browser();
+            }
+        }
+        Ok(())
+    }
+
+    fn connect(&self, url: &str) -> Result<(), Text> {
+        let uri = url.parse().map_err(|error| {
+            text!("{url} is not the address of a Rerun viewer: {why}", url = url, why = format!("{error}"))
+        })?;
+        let uri: rerun::external::re_uri::ProxyUri = uri;
+        let sink = Arc::new(GrpcSink::new(uri));
+        let shared = SharedSink(Arc::clone(&sink) as Arc<dyn rerun::sink::LogSink>);
+        self.write_to_viewers(Target::Viewers { lasting: shared.clone(), live: shared });
+        let began = std::time::Instant::now();
+        let mut told = ViewerState::Opening;
+        while !self.has_ended() {
+            let now = match sink.status() {
+                GrpcSinkConnectionState::Connecting { .. } if began.elapsed() < CONNECT => ViewerState::Opening,
+                GrpcSinkConnectionState::Connecting { .. } => ViewerState::Failed(text!(
+                    "Nothing answers at {url}: start a viewer there; the connection is tried again",
+                    url = url
+                )),
+                GrpcSinkConnectionState::Connected => ViewerState::Connected { url: url.to_owned() },
+                GrpcSinkConnectionState::Disconnected(_) => {
+                    self.leave_viewers();
+                    return Err(text!("The viewer at {url} has gone", url = url));
+                }
+            };
+            if now != told {
+                told.clone_from(&now);
+                self.reports.set_viewer(now);
+            }
+            std::thread::sleep(LOOK);
+        }
+        Ok(())
+    }
+}
