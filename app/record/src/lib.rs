@@ -61,7 +61,7 @@ mod viewer;
 pub use choice::{ChoiceError, RerunChoice};
 pub use pace::Pace;
 pub use recorder::{Recorder, RecorderOptions, WebViewer, record};
-pub use serving::relay::Relay;
+pub use serving::Relay;
 pub use viewer::ViewerWish;
 
 /// Under which viewers keep layouts and recordings of this program.

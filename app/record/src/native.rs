@@ -80,14 +80,14 @@ fn version(program: &Path) -> io::Result<String> {
     Ok(said)
 }
 
-/// Starts the viewer; it reads from these addresses.
+/// Starts the viewer; it reads from this address.
 ///
 /// # Errors
 /// When it cannot be started.
-pub fn start(program: &Path, urls: &[String]) -> io::Result<Child> {
+pub fn start(program: &Path, url: &str) -> io::Result<Child> {
     let mut viewer = command(program);
     // Without `--connect` the viewer would open a port of its own to the whole network.
-    viewer.arg("--connect").args(urls);
+    viewer.args(["--connect", url]);
     viewer.args(["--hide-welcome-screen", "--memory-limit", VIEWER_MEMORY]).stdout(Stdio::null());
     // Ctrl-C in the terminal is meant for this program alone.
     #[cfg(unix)]

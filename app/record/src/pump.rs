@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_secs(2);
 /// Writes what is in a queue, until that ends.
 pub struct Pump {
     queue: Arc<Queue>,
-    route: Route,
+    target: Target,
     reports: Arc<Reports>,
     stream: Option<Stream>,
     /// Something was written since the file was looked after.
@@ -28,18 +28,10 @@ pub struct Pump {
     failed: bool,
 }
 
-/// Where recordings go.
-pub enum Route {
-    /// Every recording into a file of its own, beside its session.
-    Sessions,
-    /// All of them to the same place.
-    To(Target),
-}
-
 impl Pump {
     /// With a queue of its own.
-    pub fn new(queue: Arc<Queue>, route: Route, reports: Arc<Reports>) -> Self {
-        Self { queue, route, reports, stream: None, touched: false, looked: Instant::now(), failed: false }
+    pub fn new(queue: Arc<Queue>, target: Target, reports: Arc<Reports>) -> Self {
+        Self { queue, target, reports, stream: None, touched: false, looked: Instant::now(), failed: false }
     }
 
     /// Works until the queue ends.
@@ -55,7 +47,7 @@ impl Pump {
                 Next::Lasting(Item::Entry(entry)) => self.write(|stream| stream.write_lasting(&entry)),
                 Next::Live(entry) => {
                     self.write(|stream| stream.write_live(&entry));
-                    if matches!(entry, Entry::Image { .. }) && matches!(self.route, Route::To(Target::Viewers { .. })) {
+                    if matches!(entry, Entry::Image { .. }) && matches!(self.target, Target::Viewers { .. }) {
                         // Waiting here, and not in buffers of the library, keeps memory short and images new.
                         self.flush();
                     }
@@ -72,16 +64,7 @@ impl Pump {
         // The file before is completed first.
         self.stream = None;
         self.failed = false;
-        let beside;
-        let target = match &self.route {
-            Route::To(target) => target,
-            Route::Sessions => {
-                let Some(folder) = recording.folder.clone() else { return };
-                beside = Target::Beside(folder);
-                &beside
-            }
-        };
-        match Stream::open(target, recording) {
+        match Stream::open(&self.target, recording) {
             Ok(stream) => {
                 if stream.file.is_some() {
                     self.reports.set_file(stream.file.clone());

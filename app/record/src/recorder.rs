@@ -119,16 +119,7 @@ impl Recording for Recorder {
 
     fn drain(&self, absorb: &mut dyn FnMut(Event)) {
         let Some(shared) = &self.shared else { return };
-        let now = shared.now();
-        for (severity, text) in shared.reports.take_notices() {
-            absorb(Event::Notice { severity, text });
-        }
-        if shared.reports.is_news(&now) {
-            absorb(Event::Rerun(now));
-        }
-        if shared.reports.take_no_browser() {
-            absorb(Event::NoBrowser);
-        }
+        shared.drain(absorb);
     }
 
     fn finish(&mut self, deadline: Duration) -> bool {

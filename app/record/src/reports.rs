@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use handeye_workbench::command::Event;
 use handeye_workbench::model::{RerunState, Severity, ViewerState};
 use handeye_workbench::text::Text;
 use handeye_workbench::worker::Waker;
 
-/// Messages that wait for the window.
-const MAX_NOTICES: usize = 32;
+/// Events that wait for the window.
+const MAX_EVENTS: usize = 32;
 
 /// What the threads tell the window.
 pub struct Reports {
@@ -19,8 +20,8 @@ pub struct Reports {
 #[derive(Default)]
 struct Inner {
     state: RerunState,
-    notices: Vec<(Severity, Text)>,
-    no_browser: bool,
+    events: Vec<Event>,
+    /// The state that the window knows.
     told: RerunState,
 }
 
@@ -64,23 +65,17 @@ impl Reports {
 
     /// Something for the user.
     pub fn notice(&self, severity: Severity, text: Text) {
+        self.tell(Event::Notice { severity, text });
+    }
+
+    /// Something that has happened.
+    pub fn tell(&self, event: Event) {
         let mut inner = self.inner();
-        if inner.notices.len() < MAX_NOTICES {
-            inner.notices.push((severity, text));
+        if inner.events.len() < MAX_EVENTS {
+            inner.events.push(event);
         }
         drop(inner);
         (self.waker)();
-    }
-
-    /// The web viewer is served and no browser shows it.
-    pub fn no_browser(&self) {
-        self.inner().no_browser = true;
-        (self.waker)();
-    }
-
-    /// Whether that is so, once.
-    pub fn take_no_browser(&self) -> bool {
-        std::mem::take(&mut self.inner().no_browser)
     }
 
     /// The state with so many entries left out.
@@ -88,18 +83,16 @@ impl Reports {
         RerunState { left_out, ..self.inner().state.clone() }
     }
 
-    /// What is to be told to the user.
-    pub fn take_notices(&self) -> Vec<(Severity, Text)> {
-        std::mem::take(&mut self.inner().notices)
-    }
-
-    /// Whether the window does not know a state yet; from now on it does.
-    pub fn is_news(&self, now: &RerunState) -> bool {
+    /// Hands over what the window does not know yet, the state first; so many entries were left out.
+    pub fn drain(&self, left_out: u64, absorb: &mut dyn FnMut(Event)) {
+        let now = self.state(left_out);
         let mut inner = self.inner();
-        let is_news = inner.told != *now;
+        let is_news = inner.told != now;
         if is_news {
-            inner.told.clone_from(now);
+            inner.told.clone_from(&now);
         }
-        is_news
+        let events = std::mem::take(&mut inner.events);
+        drop(inner);
+        is_news.then_some(Event::Rerun(now)).into_iter().chain(events).for_each(absorb);
     }
 }

@@ -9,13 +9,14 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use super::file;
 use super::lasting::{Item, Lasting, Recording, Trail, is_live};
 use super::pace::Pace;
-use super::pump::{Pump, Route};
+use super::pump::Pump;
 use super::queue::Queue;
 use super::recorder::WebViewer;
 use super::reports::Reports;
-use super::serving::{Page, Servers};
+use super::serving::Server;
 use super::stream::{Target, file_sink};
 use handeye_wording::text;
+use handeye_workbench::command::Event;
 use handeye_workbench::model::{RerunState, Severity};
 use handeye_workbench::recording::Entry;
 use handeye_workbench::worker::Started;
@@ -54,8 +55,9 @@ struct Writer {
 /// The viewers that are open.
 #[derive(Default)]
 pub(super) struct Viewers {
-    pub servers: Option<Servers>,
-    pub page: Option<Page>,
+    pub server: Option<Server>,
+    /// Whether the page of the web viewer is wanted: the server then goes on when the native viewer is closed.
+    pub on_page: bool,
 }
 
 impl Shared {
@@ -95,11 +97,16 @@ impl Shared {
     }
 
     pub fn now(&self) -> RerunState {
+        self.reports.state(self.left_out())
+    }
+
+    pub fn drain(&self, absorb: &mut dyn FnMut(Event)) {
+        self.reports.drain(self.left_out(), absorb);
+    }
+
+    fn left_out(&self) -> u64 {
         let state = self.state();
-        let writers = state.file.iter().chain(&state.viewer);
-        let left_out = writers.map(|writer| writer.queue.left_out()).sum();
-        drop(state);
-        self.reports.state(left_out)
+        state.file.iter().chain(&state.viewer).map(|writer| writer.queue.left_out()).sum()
     }
 
     pub fn note(&self, entry: Entry) {
@@ -148,7 +155,7 @@ impl Shared {
         if state.file.is_none() && self.beside_session {
             let queue = Arc::new(Queue::new(&self.pace.for_file()));
             state.replay(&queue);
-            state.file = self.writer("rerun-file", queue, Route::Sessions);
+            state.file = self.writer("rerun-file", queue, Target::Sessions);
         }
     }
 
@@ -159,7 +166,7 @@ impl Shared {
         let queue = Arc::new(Queue::new(&self.pace.for_file()));
         let mut state = self.state();
         state.replay(&queue);
-        state.file = self.writer("rerun-file", queue, Route::To(Target::File { path, sink }));
+        state.file = self.writer("rerun-file", queue, Target::File { path, sink });
         if state.file.is_none() { Err(io::Error::other("the system has no more threads")) } else { Ok(()) }
     }
 
@@ -168,7 +175,7 @@ impl Shared {
         let queue = Arc::new(Queue::new(&self.pace.for_viewer()));
         let mut state = self.state();
         state.replay(&queue);
-        let writer = self.writer("rerun-viewer", queue, Route::To(target));
+        let writer = self.writer("rerun-viewer", queue, target);
         if let Some(before) = std::mem::replace(&mut state.viewer, writer) {
             before.queue.end();
             state.ending.push(before);
@@ -184,8 +191,8 @@ impl Shared {
         }
     }
 
-    fn writer(&self, name: &str, queue: Arc<Queue>, route: Route) -> Option<Writer> {
-        let pump = Pump::new(Arc::clone(&queue), route, Arc::clone(&self.reports));
+    fn writer(&self, name: &str, queue: Arc<Queue>, target: Target) -> Option<Writer> {
+        let pump = Pump::new(Arc::clone(&queue), target, Arc::clone(&self.reports));
         match Started::spawn(name, move || pump.run()) {
             Ok(thread) => Some(Writer { queue, thread }),
             Err(error) => {

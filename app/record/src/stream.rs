@@ -50,8 +50,8 @@ impl LogSink for SharedSink {
 
 /// Where a thread writes to.
 pub enum Target {
-    /// A new file in the folder of the session.
-    Beside(PathBuf),
+    /// Every recording into a new file in the folder of its session.
+    Sessions,
     /// This file, which is there and empty.
     File {
         /// Where it is.
@@ -123,7 +123,10 @@ impl Stream {
     /// [`OpenError`].
     pub fn open(target: &Target, recording: &Recording) -> Result<Self, OpenError> {
         let (lasting, live, file) = match target {
-            Target::Beside(folder) => {
+            Target::Sessions => {
+                // This is where recordings go that have a session.
+                let folder =
+                    recording.folder.as_deref().ok_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound))?;
                 let path = file::create_beside(folder)?;
                 let stream = stream(recording, file_sink(&path)?, FILE_TICK, true)?;
                 (stream.clone(), stream, Some(path))

@@ -8,11 +8,12 @@ use std::time::Duration;
 use rerun::sink::{GrpcSink, GrpcSinkConnectionState};
 
 use super::recorder::WebViewer;
-use super::serving::Servers;
+use super::serving::Server;
 use super::shared::{Shared, Viewers};
 use super::stream::{SharedSink, Target};
 use super::{browser, native};
 use handeye_wording::text;
+use handeye_workbench::command::Event;
 use handeye_workbench::model::{Severity, ViewerState};
 use handeye_workbench::recording::BROWSER_PATH;
 use handeye_workbench::text::Text;
@@ -77,34 +78,23 @@ impl Shared {
         self.reports.set_viewer(ViewerState::Failed(why));
     }
 
-    /// The addresses from which viewers read.
-    fn serve(&self) -> Result<[String; 2], Text> {
+    /// Has a server for viewers run, on the page of the web viewer if so wished: the addresses of the recording and of the page.
+    fn serve(&self, on_page: bool) -> Result<[String; 2], Text> {
         let mut viewers = self.viewers();
-        if let Some(servers) = &viewers.servers {
-            return Ok(servers.urls());
+        if viewers.server.is_none() {
+            let relay = if let WebViewer::Relayed(relay) = &self.web { Arc::clone(relay) } else { Arc::default() };
+            let server =
+                Server::start(&relay).map_err(|error| text!("No viewer was opened: {error}", error = error))?;
+            self.write_to_viewers(server.target());
+            viewers.server = Some(server);
         }
-        let servers = Servers::start().map_err(|error| text!("No viewer was opened: {error}", error = error))?;
-        self.write_to_viewers(servers.target());
-        let urls = servers.urls();
-        viewers.servers = Some(servers);
-        Ok(urls)
-    }
-
-    /// The address of the page with the web viewer.
-    fn page(&self) -> Result<String, Text> {
-        let no_viewer = |error: std::io::Error| text!("No viewer was opened: {error}", error = error);
-        let mut viewers = self.viewers();
-        let Viewers { servers, page } = &mut *viewers;
-        if let Some(page) = page {
-            return Ok(page.url().to_owned());
-        }
-        let served = servers.as_ref().ok_or_else(|| no_viewer(std::io::Error::other("the servers have ended")))?;
-        Ok(page.insert(served.page().map_err(no_viewer)?).url().to_owned())
+        viewers.on_page |= on_page;
+        Ok(viewers.server.as_ref().map(|server| [server.url(), server.page()]).unwrap_or_default())
     }
 
     fn native(&self) -> Result<(), Text> {
         let program = native::find()?;
-        let urls = self.serve()?;
+        let [url, _page] = self.serve(false)?;
         let cannot = |error: std::io::Error| {
             text!(
                 "The native Rerun viewer {program} does not start: {error}",
@@ -112,7 +102,7 @@ impl Shared {
                 error = error
             )
         };
-        let mut child = native::start(&program, &urls).map_err(cannot)?;
+        let mut child = native::start(&program, &url).map_err(cannot)?;
         if let Some(status) = native::wait(&mut child, GRACE, || self.has_ended()).map_err(cannot)?
             && !status.success()
         {
@@ -134,28 +124,20 @@ impl Shared {
             return;
         }
         let mut viewers = self.viewers();
-        let page = viewers.page.as_ref().map(|page| page.url().to_owned());
-        if let Some(url) = page {
-            self.reports.set_viewer(ViewerState::Web { url });
+        if let Viewers { server: Some(server), on_page: true } = &*viewers {
+            self.reports.set_viewer(ViewerState::Web { url: server.page() });
             return;
         }
         // Nobody looks: writing for viewers would only cost time.
         self.leave_viewers();
-        viewers.servers = None;
+        viewers.server = None;
         drop(viewers);
         self.reports.set_viewer(ViewerState::Closed);
     }
 
     fn web(&self) -> Result<(), Text> {
-        self.serve()?;
-        if let WebViewer::Relayed(relay) = &self.web {
-            let viewers = self.viewers();
-            let served = viewers.servers.as_ref().map_or(Ok(()), |servers| servers.relay(relay));
-            served.map_err(|error| text!("No viewer was opened: {error}", error = error))?;
-            self.reports.set_viewer(ViewerState::Web { url: BROWSER_PATH.to_owned() });
-            return Ok(());
-        }
-        let url = self.page()?;
+        let [_recording, page] = self.serve(true)?;
+        let url = if matches!(self.web, WebViewer::Relayed(_)) { BROWSER_PATH.to_owned() } else { page };
         self.reports.set_viewer(ViewerState::Web { url: url.clone() });
         if matches!(self.web, WebViewer::Here) {
             let opened = browser::open(&url);
@@ -166,7 +148,7 @@ impl Shared {
             };
             self.reports.notice(Severity::Info, text);
             if !opened {
-                self.reports.no_browser();
+                self.reports.tell(Event::NoBrowser);
             }
         }
         Ok(())

@@ -18,9 +18,8 @@ const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
 /// A session that is over and still shown.
 struct Shown {
     process: Child,
-    page: u16,
-    /// What lasts and what is live.
-    recordings: [u16; 2],
+    /// Of the page and of the recording.
+    port: u16,
 }
 
 impl Drop for Shown {
@@ -47,8 +46,9 @@ impl Shown {
             .skip(1)
             .filter_map(|rest| rest.split(|letter: char| !letter.is_ascii_digit()).next()?.parse().ok())
             .collect();
-        let &[page, lasting, live] = ports.as_slice() else { panic!("{line}") };
-        Self { process, page, recordings: [lasting, live] }
+        let &[port, of_recording] = ports.as_slice() else { panic!("{line}") };
+        assert_eq!(port, of_recording, "a browser needs to reach one alone");
+        Self { process, port }
     }
 
     /// A number of the process by its name in the system.
@@ -145,31 +145,30 @@ fn a_recording_is_not_given_to_pages_that_gave_this_machine_another_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let shown = Shown::start(folder.path());
     let (mut honest, mut forged) = (usize::MAX, 0);
-    for port in shown.recordings {
-        for headers in ["Host: 127.0.0.1", "Host: localhost", "Host: 127.0.0.1\r\nOrigin: http://127.0.0.1:80"] {
-            let (status, bytes) = asked_by_a_page(port, headers);
-            assert!(status.contains(" 200 ") && bytes >= A_RECORDING, "{headers}: {status}, {bytes} bytes");
-            honest = honest.min(bytes);
-        }
-        let here = asked_by_a_viewer(port, "127.0.0.1");
-        assert!(here >= A_RECORDING, "{here} bytes");
-        for headers in [
-            "Host: evil.example",
-            "Host: evil.example:9876\r\nOrigin: http://evil.example:9876",
-            "Host: 127.0.0.1\r\nOrigin: http://evil.example",
-            "Host: 127.0.0.1\r\nOrigin: null",
-        ] {
-            let (status, bytes) = asked_by_a_page(port, headers);
-            assert!(status.contains(" 403 ") && bytes < A_RECORDING, "{headers}: {status}, {bytes} bytes");
-            forged = forged.max(bytes);
-        }
-        let elsewhere = asked_by_a_viewer(port, "evil.example");
-        assert!(elsewhere < A_RECORDING, "{elsewhere} bytes");
+    let port = shown.port;
+    for headers in ["Host: 127.0.0.1", "Host: localhost", "Host: 127.0.0.1\r\nOrigin: http://127.0.0.1:80"] {
+        let (status, bytes) = asked_by_a_page(port, headers);
+        assert!(status.contains(" 200 ") && bytes >= A_RECORDING, "{headers}: {status}, {bytes} bytes");
+        honest = honest.min(bytes);
     }
+    let here = asked_by_a_viewer(port, "127.0.0.1");
+    assert!(here >= A_RECORDING, "{here} bytes");
+    for headers in [
+        "Host: evil.example",
+        "Host: evil.example:9876\r\nOrigin: http://evil.example:9876",
+        "Host: 127.0.0.1\r\nOrigin: http://evil.example",
+        "Host: 127.0.0.1\r\nOrigin: null",
+    ] {
+        let (status, bytes) = asked_by_a_page(port, headers);
+        assert!(status.contains(" 403 ") && bytes < A_RECORDING, "{headers}: {status}, {bytes} bytes");
+        forged = forged.max(bytes);
+    }
+    let elsewhere = asked_by_a_viewer(port, "evil.example");
+    assert!(elsewhere < A_RECORDING, "{elsewhere} bytes");
     println!("{honest} bytes and more by its own name, {forged} at the most by another");
     for (headers, expected) in [("Host: 127.0.0.1", " 200 "), ("Host: evil.example", " 403 ")] {
-        let mut socket = connect(shown.page);
-        let head = format!("GET / HTTP/1.1\r\n{headers}\r\nConnection: close\r\n\r\n");
+        let mut socket = connect(shown.port);
+        let head = format!("GET /rerun/?x=1 HTTP/1.1\r\n{headers}\r\nConnection: close\r\n\r\n");
         socket.write_all(head.as_bytes()).expect("sent");
         let said = String::from_utf8_lossy(&read(&mut socket)).into_owned();
         assert!(said.lines().next().is_some_and(|line| line.contains(expected)), "{headers}: {said}");
@@ -182,34 +181,30 @@ fn connections_that_ask_nothing_hold_neither_threads_nor_memory_and_lock_nobody_
     let folder = tempfile::tempdir().expect("a folder");
     let shown = Shown::start(folder.path());
     let (threads, kilobytes) = (shown.number("Threads"), shown.number("VmRSS"));
-    for port in [shown.page, shown.recordings[0], shown.recordings[1]] {
-        let mut dribbling = Vec::new();
-        for n in 0..500 {
-            let mut socket = connect(port);
-            // Those that were given up to make room are gone already. Half of them begin with HTTP/2.
-            let begun = if n % 2 == 0 { "GET / HTTP/1.1\r\nHost: 127" } else { "PRI * HTTP/2.0\r\n\r\nSM" };
-            let _sent = socket.write_all(begun.as_bytes()).is_ok();
-            dribbling.push(socket);
-        }
-        // While they are there, and no later than without them.
-        if port == shown.page {
-            let mut socket = connect(port);
-            socket.write_all(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n").expect("sent");
-            assert!(read(&mut socket).starts_with(b"HTTP/1.1 200"));
-        } else {
-            let (status, bytes) = asked_by_a_page(port, "Host: 127.0.0.1");
-            assert!(status.contains(" 200 ") && bytes >= A_RECORDING, "{status}, {bytes} bytes");
-        }
-        let (threads_now, kilobytes_now) = (shown.number("Threads"), shown.number("VmRSS"));
-        println!(
-            "{} connections: {threads} threads before, {threads_now} now; {} MB before, {} MB now",
-            dribbling.len(),
-            kilobytes / 1024,
-            kilobytes_now / 1024
-        );
-        // Whoever is served may need a few; those who ask nothing need none, however many they are.
-        assert!(threads_now <= threads + 8, "{threads} {threads_now}");
-        // The size of a recording that is sent, and of a hundred heads of requests.
-        assert!(kilobytes_now < kilobytes + 64 * 1024, "{kilobytes} {kilobytes_now}");
+    let port = shown.port;
+    let mut dribbling = Vec::new();
+    for n in 0..500 {
+        let mut socket = connect(port);
+        // Those that were given up to make room are gone already. Half of them begin with HTTP/2.
+        let begun = if n % 2 == 0 { "GET / HTTP/1.1\r\nHost: 127" } else { "PRI * HTTP/2.0\r\n\r\nSM" };
+        let _sent = socket.write_all(begun.as_bytes()).is_ok();
+        dribbling.push(socket);
     }
+    // While they are there, and no later than without them.
+    let mut socket = connect(port);
+    socket.write_all(b"GET /rerun/?x=1 HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n").expect("sent");
+    assert!(read(&mut socket).starts_with(b"HTTP/1.1 200"));
+    let (status, bytes) = asked_by_a_page(port, "Host: 127.0.0.1");
+    assert!(status.contains(" 200 ") && bytes >= A_RECORDING, "{status}, {bytes} bytes");
+    let (threads_now, kilobytes_now) = (shown.number("Threads"), shown.number("VmRSS"));
+    println!(
+        "{} connections: {threads} threads before, {threads_now} now; {} MB before, {} MB now",
+        dribbling.len(),
+        kilobytes / 1024,
+        kilobytes_now / 1024
+    );
+    // Whoever is served may need a few; those who ask nothing need none, however many they are.
+    assert!(threads_now <= threads + 8, "{threads} {threads_now}");
+    // The size of a recording that is sent, and of a hundred heads of requests.
+    assert!(kilobytes_now < kilobytes + 64 * 1024, "{kilobytes} {kilobytes_now}");
 }

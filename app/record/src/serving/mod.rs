@@ -1,27 +1,32 @@
-//! The servers from which viewers read, and the page with the web viewer.
+//! The server from which viewers read, and the page with the web viewer: one port, of this machine.
 //!
-//! Why two servers: a server keeps what it has sent for viewers that come later, up to a limit, and forgets the oldest
-//! first. Images would push the captures out within a minute. So what lasts and what is live are served side by side, and
-//! a viewer reads both as one recording.
+//! A server of Rerun keeps what it has sent for viewers that come later, up to a limit, and forgets the oldest first. Images
+//! would push the captures out within three minutes, so what lasts and what is live are kept by two of them, and read as one.
 //!
-//! Rerun's own server listens by itself and answers whoever asks. What it serves is taken out of it here and put behind a
-//! [`Door`], in this process: there is no port behind the door that somebody else could find.
+//! Rerun's own server listens by itself, and answers whoever asks and by whatever name; one viewer that reads nothing holds up
+//! all others (`docs/reference/rerun_viewers.md` has what was measured). So what it serves is taken out of it here and put
+//! behind a [`Door`], in this process: there is no port behind the door that somebody else could find.
 
-mod engine;
 mod page;
 mod proxy;
-pub mod relay;
+mod relay;
 
-use engine::Engine;
 use std::io;
 use std::sync::Arc;
 
-use super::stream::{SharedSink, Target};
-use handeye_http::door::Door;
-use proxy::{ProxySink, Reader};
-use relay::{Relay, Relayed};
+use hyper::StatusCode;
+use tokio::runtime::{Builder, Runtime};
 
-pub use page::Page;
+use super::stream::{SharedSink, Target};
+use handeye_http::door::{Door, Limits, plain};
+use handeye_workbench::recording::BROWSER_PATH;
+use page::encoded;
+use proxy::ProxySink;
+
+pub use relay::Relay;
+
+/// Threads of the server, however many connections there are.
+const THREADS: usize = 2;
 
 /// What is kept of what lasts, for viewers that come later \[bytes\].
 pub const LASTING_BYTES: u64 = 128 * 1024 * 1024;
@@ -29,60 +34,60 @@ pub const LASTING_BYTES: u64 = 128 * 1024 * 1024;
 /// What is kept of what is live, for viewers that come later \[bytes\].
 pub const LIVE_BYTES: u64 = 32 * 1024 * 1024;
 
-/// The servers.
-pub struct Servers {
-    engine: Arc<Engine>,
-    lasting: Served,
-    live: Served,
-}
-
-/// One of them.
-struct Served {
-    sink: Arc<ProxySink>,
+/// The server; it ends when this is dropped, without being waited for.
+pub struct Server {
+    lasting: SharedSink,
+    live: SharedSink,
     door: Door,
-    reader: Reader,
+    runtime: Option<Runtime>,
 }
 
-impl Servers {
-    /// Starts them on free ports of 127.0.0.1.
+impl Server {
+    /// Starts it on a free port of 127.0.0.1, and has the recording served by `relay` as well.
     ///
     /// # Errors
     /// When there is no port or no thread.
-    pub fn start() -> io::Result<Self> {
-        let engine = Arc::new(Engine::start()?);
-        let served = |limit_bytes| -> io::Result<Served> {
-            let (sink, door, reader) = proxy::serve(&engine, limit_bytes)?;
-            Ok(Served { sink: Arc::new(sink), door, reader })
-        };
-        Ok(Self { lasting: served(LASTING_BYTES)?, live: served(LIVE_BYTES)?, engine })
+    pub fn start(relay: &Arc<Relay>) -> io::Result<Self> {
+        let runtime =
+            Builder::new_multi_thread().worker_threads(THREADS).thread_name("rerun-server").enable_all().build()?;
+        let (lasting, read_lasting) = proxy::start(&runtime, LASTING_BYTES);
+        let (live, read_live) = proxy::start(&runtime, LIVE_BYTES);
+        relay.serve([read_lasting, read_live])?;
+        let relay = Arc::clone(relay);
+        let door = Door::open(runtime.handle(), Limits::USUAL, move |request| {
+            let relay = Relay::is_for(&request).then(|| Arc::clone(&relay));
+            async move {
+                match relay {
+                    Some(relay) => relay.answer(request).await,
+                    None => plain(StatusCode::NOT_FOUND, "Recordings are only read here.\n"),
+                }
+            }
+        })?;
+        let [lasting, live] = [lasting, live].map(|sink: ProxySink| SharedSink(Arc::new(sink)));
+        Ok(Self { lasting, live, door, runtime: Some(runtime) })
     }
 
-    /// Where a stream for them writes to.
+    /// Where a stream for it writes to.
     pub fn target(&self) -> Target {
-        let sink = |served: &Served| SharedSink(Arc::clone(&served.sink) as Arc<dyn rerun::sink::LogSink>);
-        Target::Viewers { lasting: sink(&self.lasting), live: sink(&self.live) }
+        Target::Viewers { lasting: self.lasting.clone(), live: self.live.clone() }
     }
 
     /// What viewers read.
-    pub fn urls(&self) -> [String; 2] {
-        [&self.lasting, &self.live].map(|served| format!("rerun+http://{}/proxy", served.door.address()))
+    pub fn url(&self) -> String {
+        format!("rerun+http://{}/proxy", self.door.address())
     }
 
-    /// Has page and recording served by somebody else.
-    ///
-    /// # Errors
-    /// When there is no page.
-    pub fn relay(&self, relay: &Relay) -> io::Result<()> {
-        relay.serve(Relayed::new([&self.lasting, &self.live].map(|served| served.reader.clone()))?);
-        Ok(())
+    /// The page with the web viewer.
+    pub fn page(&self) -> String {
+        format!("http://{}{BROWSER_PATH}?hide_welcome_screen=1&url={}", self.door.address(), encoded(&self.url()))
     }
+}
 
-    /// Serves the page with the web viewer.
-    ///
-    /// # Errors
-    /// When there is no port.
-    pub fn page(&self) -> io::Result<Page> {
-        Page::start(&self.engine, &self.urls())
+impl Drop for Server {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Page and recording behind one port, for a browser that reaches a single one: that of `handeye serve`.
+//! Page and recording behind one port: our own, and that of `handeye serve` for a browser that reaches no other.
 
 use std::io;
 use std::pin::Pin;
@@ -15,47 +15,50 @@ use re_protos::sdk_comms::v1alpha1::{
     ReadMessagesRequest, ReadMessagesResponse, ReadTablesRequest, ReadTablesResponse, WriteMessagesRequest,
     WriteMessagesResponse, WriteTableRequest, WriteTableResponse,
 };
-use rerun::external::re_grpc_server::{MAX_DECODING_MESSAGE_SIZE, MAX_ENCODING_MESSAGE_SIZE};
+use rerun::external::re_grpc_server::{MAX_DECODING_MESSAGE_SIZE, MAX_ENCODING_MESSAGE_SIZE, cors_layer};
 use tokio_stream::{Stream, StreamExt as _};
 use tonic::body::Body;
 use tonic_web::{GrpcWebLayer, GrpcWebService};
 use tower::Layer as _;
+use tower_http::cors::Cors;
 
 use super::page::{Files, encoded};
-use super::proxy::{READ, Reader};
+use super::proxy::Reader;
 use handeye_http::door::plain;
 use handeye_workbench::recording::BROWSER_PATH;
+
+/// What a viewer asks for; what else the service can do is to write into the recording.
+const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
 
 /// The browser asks again after a second.
 const REFRESH: HeaderName = HeaderName::from_static("refresh");
 
-type Answers = TowerToHyperService<GrpcWebService<MessageProxyServiceServer<Both>>>;
+type Answers = TowerToHyperService<Cors<GrpcWebService<MessageProxyServiceServer<Both>>>>;
 
-/// A recording that somebody else serves, once there is one to look at.
+/// The recording and the page that shows it, once there is something to look at.
 #[derive(Default)]
 pub struct Relay(Mutex<Option<Arc<Relayed>>>);
 
 /// The page, and what it reads.
-pub(super) struct Relayed {
+struct Relayed {
     files: Files,
     service: Answers,
 }
 
-impl Relayed {
-    /// Of what lasts and what is live.
-    pub(super) fn new(readers: [Reader; 2]) -> io::Result<Self> {
+impl Relay {
+    /// From now on this is served: what lasts, and what is live.
+    ///
+    /// # Errors
+    /// When there is no page.
+    pub(super) fn serve(&self, readers: [Reader; 2]) -> io::Result<()> {
         let service = MessageProxyServiceServer::new(Both(readers))
             .max_decoding_message_size(MAX_DECODING_MESSAGE_SIZE)
             .max_encoding_message_size(MAX_ENCODING_MESSAGE_SIZE);
-        let service = TowerToHyperService::new(GrpcWebLayer::new().layer(service));
-        Ok(Self { files: Files::load(&[])?, service })
-    }
-}
-
-impl Relay {
-    /// From now on this is served.
-    pub(super) fn serve(&self, relayed: Relayed) {
+        // A page that another program of this machine serves asks whether it may read from this port.
+        let service = TowerToHyperService::new(cors_layer(&[]).layer(GrpcWebLayer::new().layer(service)));
+        let relayed = Relayed { files: Files::load()?, service };
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(relayed));
+        Ok(())
     }
 
     /// Whether a request is for the page or for the recording.
@@ -70,7 +73,8 @@ impl Relay {
         let Some(relayed) = relayed else { return not_yet() };
         let path = request.uri().path();
         if path == READ {
-            return relayed.service.call(request).await.unwrap_or_else(|never| match never {});
+            let answer = relayed.service.call(request).await.unwrap_or_else(|never| match never {});
+            return answer.map(Body::new);
         }
         if path == BROWSER_PATH && request.uri().query().is_none() {
             return with_recording(&request);

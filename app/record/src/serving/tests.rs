@@ -44,14 +44,14 @@ fn call(url: &str, method: &str, headers: &str) -> (String, usize) {
 
 #[test]
 fn a_recording_is_read_by_programs_and_pages_of_this_machine_only() {
-    let servers = Servers::start().expect("servers");
+    let server = Server::start(&Arc::default()).expect("a server");
     let recording = Recording { id: "one".to_owned(), name: "One".to_owned(), folder: None };
-    let mut stream = Stream::open(&servers.target(), &recording).expect("a stream");
+    let mut stream = Stream::open(&server.target(), &recording).expect("a stream");
     stream.begin().expect("written");
     stream.flush().expect("taken");
-    let [lasting, _live] = servers.urls();
+    let url = server.url();
     for headers in ["Host: 127.0.0.1", "Host: localhost:1\r\nOrigin: http://127.0.0.1:1234"] {
-        let (head, bytes) = call(&lasting, "ReadMessages", headers);
+        let (head, bytes) = call(&url, "ReadMessages", headers);
         assert!(head.starts_with("HTTP/1.1 200") && bytes > A_RECORDING, "{headers}: {bytes} bytes, {head}");
     }
     for headers in [
@@ -59,32 +59,73 @@ fn a_recording_is_read_by_programs_and_pages_of_this_machine_only() {
         "Host: 127.0.0.1\r\nOrigin: http://evil.example",
         "Host: 127.0.0.1\r\nOrigin: https://rerun.io",
     ] {
-        let (head, bytes) = call(&lasting, "ReadMessages", headers);
+        let (head, bytes) = call(&url, "ReadMessages", headers);
         assert!(head.starts_with("HTTP/1.1 403") && bytes < A_RECORDING, "{headers}: {bytes} bytes, {head}");
     }
 }
 
 #[test]
 fn nobody_writes_into_a_recording_from_outside() {
-    let servers = Servers::start().expect("servers");
-    for url in servers.urls() {
-        for method in ["WriteMessages", "WriteTable", "ReadTables"] {
-            let (head, _) = call(&url, method, "Host: 127.0.0.1");
-            assert!(head.starts_with("HTTP/1.1 404"), "{method}: {head}");
-        }
+    let server = Server::start(&Arc::default()).expect("a server");
+    for method in ["WriteMessages", "WriteTable", "ReadTables"] {
+        let (head, _) = call(&server.url(), method, "Host: 127.0.0.1");
+        assert!(head.starts_with("HTTP/1.1 404"), "{method}: {head}");
     }
 }
 
 #[test]
-fn ports_close_when_the_servers_end_and_writing_to_them_is_no_error() {
-    let servers = Servers::start().expect("servers");
-    let target = servers.target();
-    let [url, _] = servers.urls();
+fn the_port_closes_when_the_server_ends_and_writing_to_them_is_no_error() {
+    let server = Server::start(&Arc::default()).expect("a server");
+    let target = server.target();
+    let url = server.url();
     let address = url.strip_prefix("rerun+http://").and_then(|rest| rest.strip_suffix("/proxy")).expect("an address");
     let mut guest = TcpStream::connect(address).expect("it listens");
     guest.set_read_timeout(Some(SOON)).expect("set");
-    drop(servers);
+    drop(server);
     assert!(matches!(guest.read(&mut [0]), Ok(0) | Err(_)), "the connection is closed");
     let Target::Viewers { lasting, .. } = target else { panic!("not for viewers") };
     lasting.0.flush_blocking(SOON).expect("taken");
+}
+
+fn get(server: &Server, path: &str) -> String {
+    let page = server.page();
+    let address = page.strip_prefix("http://").and_then(|rest| rest.split('/').next()).expect("an address");
+    let mut client = TcpStream::connect(address).expect("it listens");
+    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost:1\r\nConnection: close\r\n\r\n");
+    client.write_all(request.as_bytes()).expect("sent");
+    let mut answer = Vec::new();
+    client.read_to_end(&mut answer).expect("an answer");
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+#[test]
+fn the_page_names_no_other_machine_and_forbids_the_browser_to_ask_one() {
+    let server = Server::start(&Arc::default()).expect("a server");
+    let page = server.page();
+    let encoded = server.url().replace('+', "%2B").replace(':', "%3A").replace('/', "%2F");
+    assert!(page.starts_with("http://127.0.0.1:") && page.ends_with(&format!("&url={encoded}")), "{page}");
+    let index = get(&server, "/rerun/?url=x");
+    let (head, html) = index.split_once("\r\n\r\n").expect("head and body");
+    assert!(head.starts_with("HTTP/1.1 200"), "{head}");
+    let head = head.to_ascii_lowercase();
+    assert!(head.contains("default-src 'none'"), "{head}");
+    assert!(head.contains("connect-src 'self' data: blob:;"), "{head}");
+    assert!(html.contains("the_canvas_id") && html.contains("favicon.ico"));
+    assert!(!html.contains("fonts.g"), "fonts are asked for elsewhere");
+    // Where the recording is, it says to whoever asks for the page alone.
+    let there = get(&server, "/rerun/");
+    assert!(
+        there.starts_with("HTTP/1.1 303") && there.contains("url=rerun%2Bhttp%3A%2F%2Flocalhost%3A1%2Fproxy"),
+        "{there}"
+    );
+}
+
+#[test]
+fn files_of_the_viewer_come_whole_and_others_are_not_there() {
+    let server = Server::start(&Arc::default()).expect("a server");
+    let wasm = get(&server, "/rerun/re_viewer_bg.wasm");
+    assert!(wasm.contains("application/wasm") && wasm.len() > 1_000_000, "{} bytes", wasm.len());
+    for path in ["/", "/rerun/../Cargo.toml", "/etc/passwd", "/rerun/sw.js"] {
+        assert!(get(&server, path).starts_with("HTTP/1.1 404"), "{path}");
+    }
 }
