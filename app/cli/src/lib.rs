@@ -162,7 +162,7 @@ pub fn main() -> ExitCode {
             };
             let relay = Arc::<Relay>::default();
             rerun_arg::of_window(&rerun, WebViewer::Relayed(Arc::clone(&relay)))
-                .and_then(|begin| handeye_serve::run(args, begin, relay, announce).map_err(Failure::failed))
+                .and_then(|begin| handeye_serve::run(args, begin, relay.routes(), announce).map_err(Failure::failed))
         }
         Command::Cell(args) => cell::run(&args),
         Command::Auto(args) => auto::run(&args),

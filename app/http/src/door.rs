@@ -4,7 +4,6 @@
 //! machine lets requests in that use a name of it ([`names`]). Every door holds a bounded number of connections, and
 //! gives up those on which nothing is asked or nothing is taken.
 
-use std::convert::Infallible;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::pin::Pin;
@@ -12,11 +11,15 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use http_body_util::{BodyExt as _, Full};
-use hyper::body::{Bytes, Incoming};
-use hyper::header::{CONTENT_TYPE, HeaderValue};
+use axum::Router;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::StatusCode;
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse as _, Response};
+use http_body_util::BodyExt as _;
+use hyper::body::Incoming;
 use hyper::service::service_fn;
-use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use hyper_util::server::conn::auto;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
@@ -24,7 +27,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 use tokio::task::{AbortHandle, JoinSet};
-use tonic::body::Body;
+use tower::ServiceExt as _;
 
 use super::names;
 
@@ -71,49 +74,41 @@ pub struct Door {
 }
 
 impl Door {
-    /// Listens on a free port of 127.0.0.1 and gives to `answer` what is asked with a name of this machine.
+    /// Listens on a free port of 127.0.0.1 and gives to `routes` what is asked with a name of this machine.
     ///
     /// # Errors
     /// When there is no port.
-    pub fn open<A, F>(runtime: &Handle, limits: Limits, answer: A) -> io::Result<Self>
-    where
-        A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
-        F: Future<Output = Response<Body>> + Send + 'static,
-    {
+    pub fn open(runtime: &Handle, limits: Limits, routes: Router) -> io::Result<Self> {
         let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        Self::at(here, runtime, limits, move |request| {
-            let answered = names::are_of_this_machine(&request).then(|| answer(request));
-            async move {
-                match answered {
-                    Some(answered) => answered.await,
-                    None => plain(StatusCode::FORBIDDEN, names::REFUSAL),
-                }
-            }
-        })
+        Self::at(here, runtime, limits, routes.layer(middleware::from_fn(by_our_name)))
     }
 
-    /// Listens at an address and gives everything that is asked to `answer`, which has to see to it who asks. A request
+    /// Listens at an address and gives everything that is asked to `routes`, which have to see to it who asks. A request
     /// may become another protocol.
     ///
     /// # Errors
     /// When the address is not one of this machine or the port is taken.
-    pub fn at<A, F>(address: SocketAddr, runtime: &Handle, limits: Limits, answer: A) -> io::Result<Self>
-    where
-        A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
-        F: Future<Output = Response<Body>> + Send + 'static,
-    {
+    pub fn at(address: SocketAddr, runtime: &Handle, limits: Limits, routes: Router) -> io::Result<Self> {
         let listener = std::net::TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let _inside = runtime.enter();
         let listener = TcpListener::from_std(listener)?;
-        let listening = runtime.spawn(listen(listener, limits, answer)).abort_handle();
+        let listening = runtime.spawn(listen(listener, limits, routes)).abort_handle();
         Ok(Self { address, listening })
     }
 
     /// Where it is.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+}
+
+async fn by_our_name(request: Request, next: Next) -> Response {
+    if names::are_of_this_machine(&request) {
+        next.run(request).await
+    } else {
+        (StatusCode::FORBIDDEN, names::REFUSAL).into_response()
     }
 }
 
@@ -144,11 +139,7 @@ struct Guest {
     activity: watch::Receiver<Activity>,
 }
 
-async fn listen<A, F>(listener: TcpListener, limits: Limits, answer: A)
-where
-    A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
-    F: Future<Output = Response<Body>> + Send + 'static,
-{
+async fn listen(listener: TcpListener, limits: Limits, routes: Router) {
     // Oldest first.
     let mut guests: Vec<Guest> = Vec::new();
     let mut tasks = JoinSet::new();
@@ -172,42 +163,39 @@ where
             guests.remove(idle).task.abort();
         }
         let (sender, activity) = watch::channel(Activity::default());
-        let task = tasks.spawn(attend(client, from.ip(), limits, Arc::new(sender), answer.clone()));
+        let task = tasks.spawn(attend(client, from.ip(), limits, Arc::new(sender), routes.clone()));
         guests.push(Guest { task, activity });
     }
 }
 
 /// Serves a connection until it ends or is given up.
-async fn attend<A, F>(
+async fn attend(
     client: TcpStream,
     from: IpAddr,
     limits: Limits,
     activity: Arc<watch::Sender<Activity>>,
-    answer: A,
-) where
-    A: Fn(Request<Incoming>) -> F + Clone + Send + Sync + 'static,
-    F: Future<Output = Response<Body>> + Send + 'static,
-{
+    routes: Router,
+) {
     // What is small and live should not wait for more.
     let _set = client.set_nodelay(true).is_ok();
     let given_up = is_given_up(limits, activity.subscribe());
     let watched = Watched { client, activity: Arc::clone(&activity) };
-    let service = service_fn(move |mut request: Request<Incoming>| {
+    let service = service_fn(move |request: axum::http::Request<Incoming>| {
+        let mut request = request.map(Body::new);
         request.extensions_mut().insert(Peer(from));
         let busy = Busy::new(&activity);
-        let answered = tokio::time::timeout(limits.answer, answer(request));
+        let answered = tokio::time::timeout(limits.answer, routes.clone().oneshot(request));
         async move {
-            let response = match answered.await {
-                Ok(response) => response,
-                Err(_late) => plain(StatusCode::REQUEST_TIMEOUT, "The request took too long.\n"),
-            };
+            let late = |_elapsed| Ok((StatusCode::REQUEST_TIMEOUT, "The request took too long.\n").into_response());
             // A request is being answered until the last of the answer was made.
-            Ok::<_, Infallible>(response.map(|body| {
-                Body::new(body.map_frame(move |frame| {
-                    let _until_then = &busy;
-                    frame
-                }))
-            }))
+            answered.await.unwrap_or_else(late).map(|response| {
+                response.map(|body| {
+                    Body::new(body.map_frame(move |frame| {
+                        let _until_then = &busy;
+                        frame
+                    }))
+                })
+            })
         }
     });
     let mut http = auto::Builder::new(TokioExecutor::new());
@@ -251,16 +239,8 @@ async fn is_given_up(limits: Limits, mut activity: watch::Receiver<Activity>) {
 struct Peer(IpAddr);
 
 /// The address from which a request came.
-pub fn asked_from<B>(request: &Request<B>) -> IpAddr {
+pub fn asked_from(request: &Request) -> IpAddr {
     request.extensions().get::<Peer>().map_or(IpAddr::V4(Ipv4Addr::UNSPECIFIED), |peer| peer.0)
-}
-
-/// A short answer.
-pub fn plain(status: StatusCode, words: &'static str) -> Response<Body> {
-    let mut response = Response::new(Body::new(Full::new(Bytes::from_static(words.as_bytes()))));
-    *response.status_mut() = status;
-    response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
-    response
 }
 
 /// Counts a request as long as it is held.

@@ -1,7 +1,10 @@
+use std::convert::Infallible;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream as Socket;
 use std::time::Instant;
 
+use axum::body::Bytes;
+use axum::routing::get;
 use tokio::runtime::{Builder, Runtime};
 
 use super::*;
@@ -17,7 +20,7 @@ fn runtime() -> Runtime {
 
 /// A door that says hello.
 fn hello(runtime: &Runtime, limits: Limits) -> Door {
-    Door::open(runtime.handle(), limits, |_request| async { plain(StatusCode::OK, "hello") }).expect("a port")
+    Door::open(runtime.handle(), limits, Router::new().route("/", get("hello"))).expect("a port")
 }
 
 fn connect(door: &Door) -> Socket {
@@ -144,20 +147,20 @@ fn those_who_are_served_are_not_given_up_for_those_who_are_not() {
     let limits = Limits { connections: 3, idle: Duration::from_millis(200), ..Limits::USUAL };
     // An answer that goes on, as a live recording does.
     let (more, rest) = watch::channel(());
-    let door = Door::open(runtime.handle(), limits, move |_request| {
+    let answer = move || {
         let mut rest = rest.clone();
         async move {
             let later = async move {
                 let _changed = rest.changed().await.is_ok();
-                Ok::<_, Infallible>(hyper::body::Frame::data(Bytes::from_static(b"later")))
+                Ok::<_, Infallible>(Bytes::from_static(b"later"))
             };
-            let first = tokio_stream::once(Ok(hyper::body::Frame::data(Bytes::from_static(b"first"))));
+            let first = tokio_stream::once(Ok(Bytes::from_static(b"first")));
             let later = tokio_stream::StreamExt::then(tokio_stream::once(later), |later| later);
             let stream = tokio_stream::StreamExt::chain(first, later);
-            Response::new(Body::new(http_body_util::StreamBody::new(Box::pin(stream))))
+            Body::from_stream(stream)
         }
-    })
-    .expect("a port");
+    };
+    let door = Door::open(runtime.handle(), limits, Router::new().route("/", get(answer))).expect("a port");
     let mut watching = connect(&door);
     watching.write_all(HONEST.as_bytes()).expect("sent");
     assert!(read_until(&mut watching, "first").contains("first"));
@@ -178,11 +181,9 @@ fn those_who_are_served_are_not_given_up_for_those_who_are_not() {
 fn an_answer_that_nobody_takes_is_given_up() {
     let runtime = runtime();
     let limits = Limits { stalled: Duration::from_millis(200), idle: SOON, ..Limits::USUAL };
-    let door = Door::open(runtime.handle(), limits, |_request| async {
-        // More than the system keeps for somebody who does not read.
-        Response::new(Body::new(Full::new(Bytes::from(vec![0; 64 << 20]))))
-    })
-    .expect("a port");
+    // More than the system keeps for somebody who does not read.
+    let routes = Router::new().route("/", get(|| async { vec![0; 64 << 20] }));
+    let door = Door::open(runtime.handle(), limits, routes).expect("a port");
     let mut socket = connect(&door);
     socket.write_all(HONEST.as_bytes()).expect("sent");
     // Sending goes on being possible until the connection is given up.

@@ -6,9 +6,9 @@
 
 use std::net::IpAddr;
 
-use hyper::header::{HOST, HeaderValue, ORIGIN};
-use hyper::http::uri::Authority;
-use hyper::{Request, Uri};
+use axum::http::header::{HOST, HeaderValue, ORIGIN};
+use axum::http::uri::Authority;
+use axum::http::{Request, Uri};
 
 /// What somebody who uses another name is told.
 pub const REFUSAL: &str = "This is served for this machine only: ask for it as 127.0.0.1 or localhost, and from a page of \

@@ -9,8 +9,8 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use hyper::header::{COOKIE, HOST, ORIGIN};
-use hyper::{Request, StatusCode};
+use axum::http::header::{COOKIE, HOST, ORIGIN};
+use axum::http::{Request, StatusCode};
 
 use super::guesses::{Guesses, Look};
 use handeye_http::names;

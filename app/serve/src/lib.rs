@@ -27,9 +27,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use axum::Router;
 
 use handeye_http::door::{Door, Limits};
-use handeye_record::Relay;
 use handeye_ui::opening::{Begin, Opening};
 use handeye_ui::signals::Signals;
 use handeye_workbench::app::{InBrowser, Reach};
@@ -57,7 +57,7 @@ const LIMITS: Limits = Limits {
 ///
 /// # Errors
 /// When the port is taken or the address is none of this machine, and as for the window.
-pub fn run(args: ServeArgs, begin: Begin, recording: Arc<Relay>, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
+pub fn run(args: ServeArgs, begin: Begin, recording: Router, announce: impl FnOnce(&str)) -> anyhow::Result<()> {
     let ServeArgs { bind, port, allow, gui } = args;
     let opening = Opening::read(gui, begin)?;
     let address = SocketAddr::new(bind, port);
@@ -76,14 +76,10 @@ pub fn run(args: ServeArgs, begin: Begin, recording: Arc<Relay>, announce: impl 
         .context("there are no threads to serve from")?;
     let (hub, wakes) = Hub::new(Arc::clone(&shown.stop));
     let hub = Arc::new(hub);
-    let site = Site::new(access, Arc::clone(&hub), shown.clone(), recording, &opening.sessions());
+    let site = Site::new(access, Arc::clone(&hub), shown.clone(), &opening.sessions());
     let site = Arc::new(site);
-    let answering = Arc::clone(&site);
-    let door = Door::at(address, runtime.handle(), LIMITS, move |request| {
-        let site = Arc::clone(&answering);
-        async move { site.answer(request).await }
-    })
-    .with_context(|| format!("cannot listen at {address}"))?;
+    let door = Door::at(address, runtime.handle(), LIMITS, Arc::clone(&site).routes(recording))
+        .with_context(|| format!("cannot listen at {address}"))?;
     let signals = Signals::listen();
     let host = Host::open(opening, shown, Arc::clone(&hub), wakes, signals)?;
     announce(&site.url(door.address()));

@@ -4,28 +4,30 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use futures_util::StreamExt as _;
-use http_body_util::{BodyExt as _, Full, StreamBody};
-use hyper::body::{Bytes, Frame, Incoming};
-use hyper::header::{
+use axum::Router;
+use axum::body::Body;
+use axum::extract::{self, Request, State};
+use axum::http::header::{
     CACHE_CONTROL, CONNECTION, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderValue, LOCATION,
-    REFERRER_POLICY, SEC_WEBSOCKET_ACCEPT, SEC_WEBSOCKET_KEY, SEC_WEBSOCKET_VERSION, SET_COOKIE, UPGRADE,
+    ORIGIN, REFERRER_POLICY, SEC_WEBSOCKET_ACCEPT, SEC_WEBSOCKET_KEY, SEC_WEBSOCKET_VERSION, SET_COOKIE, UPGRADE,
     X_CONTENT_TYPE_OPTIONS,
 };
-use hyper::{Method, Request, Response, StatusCode};
+use axum::http::{HeaderMap, StatusCode};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use http_body_util::BodyExt as _;
 use percent_encoding::percent_decode_str;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
-use tonic::body::Body;
 
 use super::access::{Access, Verdict};
 use super::archive::{Contents, Pieces};
 use super::hub::Hub;
 use super::socket;
 use super::upload::{UploadError, Uploads};
-use handeye_http::door::{asked_from, plain};
-use handeye_record::Relay;
+use handeye_http::door::asked_from;
 use handeye_workbench::app::InBrowser;
 
 /// What the browser may load and where it may connect to: this server, and nothing else.
@@ -38,7 +40,7 @@ const OURS: &str = "x-handeye";
 /// Folders that are downloaded at a time: each keeps a thread and the disk busy.
 const DOWNLOADS: usize = 1;
 
-/// What is read of a recording at a time. A viewer has two that last; of the connections most are left for pages.
+/// What is read of a recording at a time. A viewer has one that lasts; of the connections most are left for pages.
 const RECORDINGS: usize = 16;
 
 /// All that is served.
@@ -46,18 +48,17 @@ pub struct Site {
     access: Access,
     hub: Arc<Hub>,
     shown: InBrowser,
-    recording: Arc<Relay>,
     uploads: Arc<Uploads>,
     downloads: Arc<Semaphore>,
     recordings: Arc<Semaphore>,
 }
 
 impl Site {
-    /// For a window and its recording, with uploads into a folder of the sessions.
-    pub fn new(access: Access, hub: Arc<Hub>, shown: InBrowser, recording: Arc<Relay>, sessions: &Path) -> Self {
+    /// For a window, with uploads into a folder of the sessions.
+    pub fn new(access: Access, hub: Arc<Hub>, shown: InBrowser, sessions: &Path) -> Self {
         let uploads = Arc::new(Uploads::new(sessions));
         let [downloads, recordings] = [DOWNLOADS, RECORDINGS].map(|places| Arc::new(Semaphore::new(places)));
-        Self { access, hub, shown, recording, uploads, downloads, recordings }
+        Self { access, hub, shown, uploads, downloads, recordings }
     }
 
     /// What a person opens.
@@ -65,167 +66,144 @@ impl Site {
         self.access.url(address)
     }
 
-    /// Answers a request.
-    pub async fn answer(&self, request: Request<Incoming>) -> Response<Body> {
-        let mut response = match self.access.judge(&request, asked_from(&request), Instant::now()) {
-            Verdict::Enter => self.enter(request).await,
-            Verdict::Refuse(status, why) => plain(status, why),
-            Verdict::Welcome(cookie) => {
-                let mut response = plain(StatusCode::SEE_OTHER, "");
-                if let Ok(cookie) = HeaderValue::from_str(&cookie) {
-                    response.headers_mut().insert(SET_COOKIE, cookie);
-                }
-                response.headers_mut().insert(LOCATION, HeaderValue::from_static("/"));
-                response
-            }
-        };
-        // The viewer of recordings brings its own.
-        let policy = response.headers_mut().entry(CONTENT_SECURITY_POLICY);
-        policy.or_insert(HeaderValue::from_static(POLICY));
-        response.headers_mut().extend([
-            (REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
-            (X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
-            (CACHE_CONTROL, HeaderValue::from_static("no-store")),
-        ]);
-        response
-    }
-
-    async fn enter(&self, request: Request<Incoming>) -> Response<Body> {
-        if Relay::is_for(&request) {
-            let Ok(place) = Arc::clone(&self.recordings).try_acquire_owned() else {
-                return plain(StatusCode::SERVICE_UNAVAILABLE, "The recording is read by too many already.\n");
-            };
-            return until_its_end(self.recording.answer(request).await, place);
-        }
-        let path = request.uri().path().to_owned();
-        match (request.method(), path.as_str()) {
-            (&Method::GET, "/") => file("text/html; charset=utf-8", include_str!("page/index.html")),
-            (&Method::GET, "/client.js") => file("text/javascript; charset=utf-8", include_str!("page/client.js")),
-            (&Method::GET, "/painter.js") => file("text/javascript; charset=utf-8", include_str!("page/painter.js")),
-            (&Method::GET, "/style.css") => file("text/css; charset=utf-8", include_str!("page/style.css")),
-            (&Method::GET, "/icon.svg") => file("image/svg+xml", include_str!("page/icon.svg")),
-            (&Method::GET, "/socket") => self.socket(request),
-            (&Method::GET, "/download") => self.download(&request).await,
-            (&Method::POST, path) if path.starts_with("/upload/") => self.upload(path, request).await,
-            (&Method::GET, _) => plain(StatusCode::NOT_FOUND, "There is nothing here.\n"),
-            _ => plain(StatusCode::METHOD_NOT_ALLOWED, "This cannot be done here.\n"),
-        }
-    }
-
-    /// Makes the connection of a page out of a request.
-    fn socket(&self, mut request: Request<Incoming>) -> Response<Body> {
-        let headers = request.headers();
-        let says = |name, word: &str| {
-            let value = headers.get(&name).and_then(|value: &HeaderValue| value.to_str().ok()).unwrap_or_default();
-            value.split(',').any(|part| part.trim().eq_ignore_ascii_case(word))
-        };
-        let is_websocket =
-            says(UPGRADE, "websocket") && says(CONNECTION, "upgrade") && says(SEC_WEBSOCKET_VERSION, "13");
-        // Browsers say where a page is from; who says nothing is no page, and has no business here either.
-        let is_page = headers.contains_key(hyper::header::ORIGIN);
-        let (true, true, Some(key)) = (is_websocket, is_page, headers.get(SEC_WEBSOCKET_KEY)) else {
-            return plain(StatusCode::BAD_REQUEST, "This is for the connection of a page.\n");
-        };
-        let Ok(accept) = HeaderValue::from_str(&derive_accept_key(key.as_bytes())) else {
-            return plain(StatusCode::BAD_REQUEST, "This is for the connection of a page.\n");
-        };
-        let name = query(&request, "page").unwrap_or_default();
-        if name.is_empty() || name.len() > 64 {
-            return plain(StatusCode::BAD_REQUEST, "The page has no name.\n");
-        }
-        let (hub, uploads) = (Arc::clone(&self.hub), Arc::clone(&self.uploads));
-        let upgrade = hyper::upgrade::on(&mut request);
-        tokio::spawn(async move {
-            match upgrade.await {
-                Ok(upgraded) => socket::attend(upgraded, name, hub, uploads).await,
-                Err(error) => tracing::debug!(%error, "a page did not connect"),
-            }
-        });
-        let mut response = Response::new(Body::empty());
-        *response.status_mut() = StatusCode::SWITCHING_PROTOCOLS;
-        response.headers_mut().extend([
-            (UPGRADE, HeaderValue::from_static("websocket")),
-            (CONNECTION, HeaderValue::from_static("upgrade")),
-            (SEC_WEBSOCKET_ACCEPT, accept),
-        ]);
-        response
-    }
-
-    async fn upload(&self, path: &str, request: Request<Incoming>) -> Response<Body> {
-        if !request.headers().contains_key(OURS) {
-            return plain(StatusCode::FORBIDDEN, "Only the page uploads.\n");
-        }
-        let rest = path.strip_prefix("/upload/").unwrap_or_default();
-        let Some((upload, name)) = rest.split_once('/') else {
-            return plain(StatusCode::BAD_REQUEST, "A file has a name.\n");
-        };
-        let Ok(name) = percent_decode_str(name).decode_utf8() else {
-            return plain(StatusCode::BAD_REQUEST, "A name is in UTF-8.\n");
-        };
-        match self.uploads.take(upload, &name, request.into_body()).await {
-            Ok(()) => plain(StatusCode::NO_CONTENT, ""),
-            Err(error) => {
-                tracing::warn!(%error, file = %name, "an upload was refused");
-                match error {
-                    UploadError::Name => plain(StatusCode::BAD_REQUEST, "The name of a file may not lead out.\n"),
-                    UploadError::TooMuch => plain(StatusCode::PAYLOAD_TOO_LARGE, "That is too much.\n"),
-                    UploadError::Busy => plain(
-                        StatusCode::SERVICE_UNAVAILABLE,
-                        "Other files are coming; try again when they are here.\n",
-                    ),
-                    UploadError::Stalled => plain(StatusCode::REQUEST_TIMEOUT, "Nothing came of the file.\n"),
-                    UploadError::Io(_) => plain(StatusCode::INTERNAL_SERVER_ERROR, "The file could not be kept.\n"),
-                }
-            }
-        }
-    }
-
-    async fn download(&self, request: &Request<Incoming>) -> Response<Body> {
-        let Some(folder) = query(request, "folder").map(PathBuf::from).filter(|folder| self.shown.reach.has(folder))
-        else {
-            return plain(StatusCode::FORBIDDEN, "This folder is not for browsers.\n");
-        };
-        let Ok(place) = Arc::clone(&self.downloads).try_acquire_owned() else {
-            let why = "Another folder is being downloaded; try again when it is done.\n";
-            return plain(StatusCode::SERVICE_UNAVAILABLE, why);
-        };
-        let name = archive_name(&folder);
-        let listed = tokio::task::spawn_blocking(move || Contents::of(&folder)).await;
-        let contents = match listed.map_err(std::io::Error::other).flatten() {
-            Ok(contents) => contents,
-            Err(error) => {
-                tracing::warn!(%error, "a folder could not be downloaded");
-                return plain(StatusCode::INTERNAL_SERVER_ERROR, "The folder could not be read.\n");
-            }
-        };
-        let (mut pieces, taken) = Pieces::new();
-        // Not waited for: it ends with the last piece, or when nobody takes any more.
-        drop(tokio::task::spawn_blocking(move || {
-            let _until_then = place;
-            if let Err(error) = contents.write(&mut pieces) {
-                tracing::debug!(%error, "a download has ended early");
-                pieces.fail(error);
-            }
-        }));
-        let frames = ReceiverStream::new(taken).map(|piece| piece.map(Frame::data));
-        let mut response = Response::new(Body::new(StreamBody::new(frames.boxed())));
-        let headers = response.headers_mut();
-        headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/zip"));
-        if let Ok(value) = HeaderValue::from_str(&format!("attachment; filename=\"{name}\"")) {
-            headers.insert(CONTENT_DISPOSITION, value);
-        }
-        response
+    /// What can be asked for, the recording included, by those who may.
+    pub fn routes(self: Arc<Self>, recording: Router) -> Router {
+        let recording = recording.layer(middleware::from_fn_with_state(Arc::clone(&self), with_a_place));
+        Router::new()
+            .route("/", file("text/html; charset=utf-8", include_str!("page/index.html")))
+            .route("/client.js", file("text/javascript; charset=utf-8", include_str!("page/client.js")))
+            .route("/painter.js", file("text/javascript; charset=utf-8", include_str!("page/painter.js")))
+            .route("/style.css", file("text/css; charset=utf-8", include_str!("page/style.css")))
+            .route("/icon.svg", file("image/svg+xml", include_str!("page/icon.svg")))
+            .route("/socket", get(connected))
+            .route("/download", get(download))
+            .route("/upload/{upload}/{*name}", post(upload))
+            .with_state(Arc::clone(&self))
+            .merge(recording)
+            .layer(middleware::from_fn_with_state(self, judged))
     }
 }
 
-/// Keeps a place until the last of an answer was made.
-fn until_its_end(response: Response<Body>, place: OwnedSemaphorePermit) -> Response<Body> {
-    response.map(|body| {
+/// Lets those in who may, and tells browsers what they may do with the answer.
+async fn judged(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
+    let mut response = match site.access.judge(&request, asked_from(&request), Instant::now()) {
+        Verdict::Enter => next.run(request).await,
+        Verdict::Refuse(status, why) => (status, why).into_response(),
+        Verdict::Welcome(cookie) => {
+            (StatusCode::SEE_OTHER, [(SET_COOKIE, cookie.as_str()), (LOCATION, "/")]).into_response()
+        }
+    };
+    // The viewer of recordings brings its own.
+    let policy = response.headers_mut().entry(CONTENT_SECURITY_POLICY);
+    policy.or_insert(HeaderValue::from_static(POLICY));
+    response.headers_mut().extend([
+        (REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
+        (X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+        (CACHE_CONTROL, HeaderValue::from_static("no-store")),
+    ]);
+    response
+}
+
+/// Keeps a place for what is read of a recording until the last of it was made.
+async fn with_a_place(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
+    let Ok(place) = Arc::clone(&site.recordings).try_acquire_owned() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "The recording is read by too many already.\n").into_response();
+    };
+    next.run(request).await.map(|body| {
         Body::new(body.map_frame(move |frame| {
             let _until_then = &place;
             frame
         }))
     })
+}
+
+/// Makes the connection of a page out of a request.
+async fn connected(State(site): State<Arc<Site>>, mut request: Request) -> Response {
+    let headers = request.headers();
+    let says = |name, word: &str| {
+        let value = headers.get(&name).and_then(|value: &HeaderValue| value.to_str().ok()).unwrap_or_default();
+        value.split(',').any(|part| part.trim().eq_ignore_ascii_case(word))
+    };
+    let is_websocket = says(UPGRADE, "websocket") && says(CONNECTION, "upgrade") && says(SEC_WEBSOCKET_VERSION, "13");
+    // Browsers say where a page is from; who says nothing is no page, and has no business here either.
+    let is_page = headers.contains_key(ORIGIN);
+    let (true, true, Some(key)) = (is_websocket, is_page, headers.get(SEC_WEBSOCKET_KEY)) else {
+        return (StatusCode::BAD_REQUEST, "This is for the connection of a page.\n").into_response();
+    };
+    let accept = derive_accept_key(key.as_bytes());
+    let name = query(&request, "page").unwrap_or_default();
+    if name.is_empty() || name.len() > 64 {
+        return (StatusCode::BAD_REQUEST, "The page has no name.\n").into_response();
+    }
+    let (hub, uploads) = (Arc::clone(&site.hub), Arc::clone(&site.uploads));
+    let upgrade = hyper::upgrade::on(&mut request);
+    tokio::spawn(async move {
+        match upgrade.await {
+            Ok(upgraded) => socket::attend(upgraded, name, hub, uploads).await,
+            Err(error) => tracing::debug!(%error, "a page did not connect"),
+        }
+    });
+    let headers = [(UPGRADE, "websocket"), (CONNECTION, "upgrade"), (SEC_WEBSOCKET_ACCEPT, accept.as_str())];
+    (StatusCode::SWITCHING_PROTOCOLS, headers).into_response()
+}
+
+async fn upload(
+    State(site): State<Arc<Site>>,
+    extract::Path((upload, name)): extract::Path<(String, String)>,
+    headers: HeaderMap,
+    body: Body,
+) -> Response {
+    if !headers.contains_key(OURS) {
+        return (StatusCode::FORBIDDEN, "Only the page uploads.\n").into_response();
+    }
+    match site.uploads.take(&upload, &name, body).await {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(error) => {
+            tracing::warn!(%error, file = %name, "an upload was refused");
+            let (status, why) = match error {
+                UploadError::Name => (StatusCode::BAD_REQUEST, "The name of a file may not lead out.\n"),
+                UploadError::TooMuch => (StatusCode::PAYLOAD_TOO_LARGE, "That is too much.\n"),
+                UploadError::Busy => {
+                    (StatusCode::SERVICE_UNAVAILABLE, "Other files are coming; try again when they are here.\n")
+                }
+                UploadError::Stalled => (StatusCode::REQUEST_TIMEOUT, "Nothing came of the file.\n"),
+                UploadError::Io(_) => (StatusCode::INTERNAL_SERVER_ERROR, "The file could not be kept.\n"),
+            };
+            (status, why).into_response()
+        }
+    }
+}
+
+async fn download(State(site): State<Arc<Site>>, request: Request) -> Response {
+    let Some(folder) = query(&request, "folder").map(PathBuf::from).filter(|folder| site.shown.reach.has(folder))
+    else {
+        return (StatusCode::FORBIDDEN, "This folder is not for browsers.\n").into_response();
+    };
+    let Ok(place) = Arc::clone(&site.downloads).try_acquire_owned() else {
+        let why = "Another folder is being downloaded; try again when it is done.\n";
+        return (StatusCode::SERVICE_UNAVAILABLE, why).into_response();
+    };
+    let name = archive_name(&folder);
+    let listed = tokio::task::spawn_blocking(move || Contents::of(&folder)).await;
+    let contents = match listed.map_err(std::io::Error::other).flatten() {
+        Ok(contents) => contents,
+        Err(error) => {
+            tracing::warn!(%error, "a folder could not be downloaded");
+            return (StatusCode::INTERNAL_SERVER_ERROR, "The folder could not be read.\n").into_response();
+        }
+    };
+    let (mut pieces, taken) = Pieces::new();
+    // Not waited for: it ends with the last piece, or when nobody takes any more.
+    drop(tokio::task::spawn_blocking(move || {
+        let _until_then = place;
+        if let Err(error) = contents.write(&mut pieces) {
+            tracing::debug!(%error, "a download has ended early");
+            pieces.fail(error);
+        }
+    }));
+    let attached = format!("attachment; filename=\"{name}\"");
+    let headers = [(CONTENT_TYPE, "application/zip"), (CONTENT_DISPOSITION, attached.as_str())];
+    (headers, Body::from_stream(ReceiverStream::new(taken))).into_response()
 }
 
 /// The name of a folder's archive, with letters that every system takes.
@@ -237,14 +215,12 @@ fn archive_name(folder: &Path) -> String {
     format!("{}.zip", name.chars().map(safe).collect::<String>())
 }
 
-fn query<B>(request: &Request<B>, wanted: &str) -> Option<String> {
+fn query(request: &Request, wanted: &str) -> Option<String> {
     let pairs = request.uri().query()?.split('&').filter_map(|pair| pair.split_once('='));
     let value = pairs.into_iter().find(|(name, _)| *name == wanted)?.1;
     Some(percent_decode_str(value).decode_utf8().ok()?.into_owned())
 }
 
-fn file(kind: &'static str, text: &'static str) -> Response<Body> {
-    let mut response = Response::new(Body::new(Full::new(Bytes::from_static(text.as_bytes()))));
-    response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(kind));
-    response
+fn file<S: Clone + Send + Sync + 'static>(kind: &'static str, text: &'static str) -> axum::routing::MethodRouter<S> {
+    get(move || async move { ([(CONTENT_TYPE, kind)], text) })
 }

@@ -9,8 +9,8 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use axum::body::Body;
 use http_body_util::BodyExt as _;
-use hyper::body::Incoming;
 use tokio::io::AsyncWriteExt as _;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
@@ -114,7 +114,7 @@ impl Uploads {
     ///
     /// # Errors
     /// See [`UploadError`]; what was written of the file is then removed.
-    pub async fn take(&self, upload: &str, path: &str, mut body: Incoming) -> Result<(), UploadError> {
+    pub async fn take(&self, upload: &str, path: &str, mut body: Body) -> Result<(), UploadError> {
         let relative = harmless(path).ok_or(UploadError::Name)?;
         let Ok(_place) = self.places.try_acquire() else { return Err(UploadError::Busy) };
         let coming = self.begun(upload)?;

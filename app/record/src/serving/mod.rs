@@ -14,11 +14,10 @@ mod relay;
 use std::io;
 use std::sync::Arc;
 
-use hyper::StatusCode;
 use tokio::runtime::{Builder, Runtime};
 
 use super::stream::{SharedSink, Target};
-use handeye_http::door::{Door, Limits, plain};
+use handeye_http::door::{Door, Limits};
 use handeye_workbench::recording::BROWSER_PATH;
 use page::encoded;
 use proxy::ProxySink;
@@ -53,16 +52,7 @@ impl Server {
         let (lasting, read_lasting) = proxy::start(&runtime, LASTING_BYTES);
         let (live, read_live) = proxy::start(&runtime, LIVE_BYTES);
         relay.serve([read_lasting, read_live])?;
-        let relay = Arc::clone(relay);
-        let door = Door::open(runtime.handle(), Limits::USUAL, move |request| {
-            let relay = Relay::is_for(&request).then(|| Arc::clone(&relay));
-            async move {
-                match relay {
-                    Some(relay) => relay.answer(request).await,
-                    None => plain(StatusCode::NOT_FOUND, "Recordings are only read here.\n"),
-                }
-            }
-        })?;
+        let door = Door::open(runtime.handle(), Limits::USUAL, relay.routes())?;
         let [lasting, live] = [lasting, live].map(|sink: ProxySink| SharedSink(Arc::new(sink)));
         Ok(Self { lasting, live, door, runtime: Some(runtime) })
     }

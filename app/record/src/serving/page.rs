@@ -4,18 +4,18 @@
 use std::io;
 use std::sync::Arc;
 
-use http_body_util::Full;
-use hyper::body::Bytes;
-use hyper::header::{
-    CACHE_CONTROL, CONTENT_LENGTH, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
+use axum::body::Bytes;
+use axum::extract::State;
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
     X_CONTENT_TYPE_OPTIONS,
 };
-use hyper::{Method, Response, StatusCode};
+use axum::http::{StatusCode, Uri};
+use axum::response::{IntoResponse as _, Response};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use re_web_viewer_server::WebViewerData;
-use tonic::body::Body;
 
-use handeye_http::door::plain;
+use handeye_workbench::recording::BROWSER_PATH;
 
 /// What the viewer's page reads its progress from.
 const FINAL_LENGTH: HeaderName = HeaderName::from_static("rerun-final-length");
@@ -56,32 +56,26 @@ impl Files {
         Ok(Self { viewer: Arc::new(viewer), index })
     }
 
-    pub(super) fn answer(&self, method: &Method, path: &str) -> Response<Body> {
-        if !matches!(*method, Method::GET | Method::HEAD) {
-            return plain(StatusCode::METHOD_NOT_ALLOWED, "only GET\n");
-        }
-        let part = |part: fn(&WebViewerData) -> &[u8]| Bytes::from_owner(Part(Arc::clone(&self.viewer), part));
-        let (kind, body) = match path {
-            "/" | "/index.html" => ("text/html; charset=utf-8", self.index.clone()),
-            "/favicon.ico" => ("image/x-icon", part(WebViewerData::favicon)),
-            "/apple-touch-icon.png" => ("image/png", part(WebViewerData::apple_touch_icon)),
-            "/re_viewer.js" => ("text/javascript", part(WebViewerData::viewer_js)),
-            "/re_viewer_bg.wasm" => ("application/wasm", part(WebViewerData::viewer_wasm)),
-            _ => return plain(StatusCode::NOT_FOUND, "not here\n"),
+    /// A file of the viewer; the page itself has no name.
+    pub(super) async fn answer(State(files): State<Arc<Self>>, uri: Uri) -> Response {
+        let part = |part: fn(&WebViewerData) -> &[u8]| Bytes::from_owner(Part(Arc::clone(&files.viewer), part));
+        let (kind, body) = match uri.path().strip_prefix(BROWSER_PATH).unwrap_or_default() {
+            "" | "index.html" => ("text/html; charset=utf-8", files.index.clone()),
+            "favicon.ico" => ("image/x-icon", part(WebViewerData::favicon)),
+            "apple-touch-icon.png" => ("image/png", part(WebViewerData::apple_touch_icon)),
+            "re_viewer.js" => ("text/javascript", part(WebViewerData::viewer_js)),
+            "re_viewer_bg.wasm" => ("application/wasm", part(WebViewerData::viewer_wasm)),
+            _ => return (StatusCode::NOT_FOUND, "not here\n").into_response(),
         };
-        let length = HeaderValue::from(body.len());
-        let body = if *method == Method::HEAD { Body::empty() } else { Body::new(Full::new(body)) };
-        let mut response = Response::new(body);
-        response.headers_mut().extend([
+        let headers = [
             (CONTENT_TYPE, HeaderValue::from_static(kind)),
-            (CONTENT_LENGTH, length.clone()),
-            (FINAL_LENGTH, length),
+            (FINAL_LENGTH, HeaderValue::from(body.len())),
             (CONTENT_SECURITY_POLICY, POLICY),
             (REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
             (X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
             (CACHE_CONTROL, HeaderValue::from_static("no-store")),
-        ]);
-        response
+        ];
+        (headers, body).into_response()
     }
 }
 

@@ -4,12 +4,12 @@ use std::io;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use http_body_util::Full;
-use hyper::body::{Bytes, Incoming};
-use hyper::header::{CONTENT_TYPE, HOST, HeaderName, HeaderValue, LOCATION};
-use hyper::service::Service as _;
-use hyper::{Request, Response, StatusCode};
-use hyper_util::service::TowerToHyperService;
+use axum::Router;
+use axum::extract::{Request, State};
+use axum::http::StatusCode;
+use axum::http::header::{CONTENT_TYPE, HOST, HeaderName, LOCATION};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::{any, get};
 use re_protos::sdk_comms::v1alpha1::message_proxy_service_server::{MessageProxyService, MessageProxyServiceServer};
 use re_protos::sdk_comms::v1alpha1::{
     ReadMessagesRequest, ReadMessagesResponse, ReadTablesRequest, ReadTablesResponse, WriteMessagesRequest,
@@ -17,33 +17,25 @@ use re_protos::sdk_comms::v1alpha1::{
 };
 use rerun::external::re_grpc_server::{MAX_DECODING_MESSAGE_SIZE, MAX_ENCODING_MESSAGE_SIZE, cors_layer};
 use tokio_stream::{Stream, StreamExt as _};
-use tonic::body::Body;
-use tonic_web::{GrpcWebLayer, GrpcWebService};
-use tower::Layer as _;
-use tower_http::cors::Cors;
+use tonic_web::GrpcWebLayer;
+use tower::{Layer as _, ServiceExt as _};
 
 use super::page::{Files, encoded};
 use super::proxy::Reader;
-use handeye_http::door::plain;
 use handeye_workbench::recording::BROWSER_PATH;
 
 /// What a viewer asks for; what else the service can do is to write into the recording.
 const READ: &str = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
 
+/// Files of the viewer.
+const FILE: &str = "/rerun/{file}";
+
 /// The browser asks again after a second.
 const REFRESH: HeaderName = HeaderName::from_static("refresh");
 
-type Answers = TowerToHyperService<Cors<GrpcWebService<MessageProxyServiceServer<Both>>>>;
-
 /// The recording and the page that shows it, once there is something to look at.
 #[derive(Default)]
-pub struct Relay(Mutex<Option<Arc<Relayed>>>);
-
-/// The page, and what it reads.
-struct Relayed {
-    files: Files,
-    service: Answers,
-}
+pub struct Relay(Mutex<Option<Router>>);
 
 impl Relay {
     /// From now on this is served: what lasts, and what is live.
@@ -55,54 +47,47 @@ impl Relay {
             .max_decoding_message_size(MAX_DECODING_MESSAGE_SIZE)
             .max_encoding_message_size(MAX_ENCODING_MESSAGE_SIZE);
         // A page that another program of this machine serves asks whether it may read from this port.
-        let service = TowerToHyperService::new(cors_layer(&[]).layer(GrpcWebLayer::new().layer(service)));
-        let relayed = Relayed { files: Files::load()?, service };
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(relayed));
+        let service = cors_layer(&[]).layer(GrpcWebLayer::new().layer(service));
+        let routes = Router::new()
+            .route_service(READ, service)
+            .route(BROWSER_PATH, get(page))
+            .route(FILE, get(Files::answer))
+            .with_state(Arc::new(Files::load()?));
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(routes);
         Ok(())
     }
 
-    /// Whether a request is for the page or for the recording.
-    pub fn is_for<B>(request: &Request<B>) -> bool {
-        let path = request.uri().path();
-        path.starts_with(BROWSER_PATH) || path == READ
-    }
-
-    /// Answers such a request. The one who asks has been let in by whoever listens.
-    pub async fn answer(&self, request: Request<Incoming>) -> Response<Body> {
-        let relayed = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let Some(relayed) = relayed else { return not_yet() };
-        let path = request.uri().path();
-        if path == READ {
-            let answer = relayed.service.call(request).await.unwrap_or_else(|never| match never {});
-            return answer.map(Body::new);
-        }
-        if path == BROWSER_PATH && request.uri().query().is_none() {
-            return with_recording(&request);
-        }
-        let file = path.strip_prefix(BROWSER_PATH).unwrap_or_default();
-        relayed.files.answer(request.method(), &format!("/{file}"))
+    /// What is asked for: the recording to read, and the page. Whoever asks has been let in by whoever listens.
+    pub fn routes(self: &Arc<Self>) -> Router {
+        let answered = any(answer).with_state(Arc::clone(self));
+        Router::new().route(READ, answered.clone()).route(BROWSER_PATH, answered.clone()).route(FILE, answered)
     }
 }
 
-/// The viewer is told in its address where the recording is.
-fn with_recording<B>(request: &Request<B>) -> Response<Body> {
+async fn answer(State(relay): State<Arc<Relay>>, request: Request) -> Response {
+    let routes = relay.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    match routes {
+        Some(routes) => routes.oneshot(request).await.unwrap_or_else(|never| match never {}),
+        None => not_yet(),
+    }
+}
+
+/// The page; the viewer is told in its address where the recording is.
+async fn page(files: State<Arc<Files>>, request: Request) -> Response {
+    if request.uri().query().is_some() {
+        return Files::answer(files, request.uri().clone()).await;
+    }
     let host = request.headers().get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
     let url = encoded(&format!("rerun+http://{host}/proxy"));
-    let mut response = plain(StatusCode::SEE_OTHER, "");
-    if let Ok(there) = HeaderValue::from_str(&format!("{BROWSER_PATH}?hide_welcome_screen=1&url={url}")) {
-        response.headers_mut().insert(LOCATION, there);
-    }
-    response
+    let there = format!("{BROWSER_PATH}?hide_welcome_screen=1&url={url}");
+    (StatusCode::SEE_OTHER, [(LOCATION, there)]).into_response()
 }
 
-fn not_yet() -> Response<Body> {
+fn not_yet() -> Response {
     let words = "<!doctype html><meta charset=\"utf-8\"><title>Rerun</title><p>The recording is being opened…</p>\
                  <p>正在打开记录…</p>";
-    let mut response = Response::new(Body::new(Full::new(Bytes::from_static(words.as_bytes()))));
-    *response.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
-    response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/html; charset=utf-8"));
-    response.headers_mut().insert(REFRESH, HeaderValue::from_static("1"));
-    response
+    (StatusCode::SERVICE_UNAVAILABLE, [(CONTENT_TYPE, "text/html; charset=utf-8"), (REFRESH, "1")], words)
+        .into_response()
 }
 
 /// Two services that are read as one.
