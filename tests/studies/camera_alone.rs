@@ -12,11 +12,11 @@ use std::process::ExitCode;
 use handeye_estimate::Method;
 use handeye_estimate::diagnose::findings::{FindingCode, FindingOptions, findings};
 use handeye_estimate::diagnose::{Calibration, calibrate};
-use handeye_estimate::testing::{BoardViews, SharedErrors};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::Grid;
 use handeye_geometry::targets::bent::BoardShape;
+use handeye_simulate::{BoardViews, SharedErrors};
 use rayon::prelude::*;
 
 const COEFFICIENTS: [f64; 5] = [-0.21, 0.12, 0.001, -0.002, -0.02];

@@ -11,10 +11,10 @@ use handeye_estimate::diagnose::findings::FindingOptions;
 use handeye_estimate::diagnose::{Calibration, calibrate, examine};
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::shared_lens::{NamedSession, calibrate_sharing_lens};
-use handeye_estimate::testing::sessions::{REALISTIC, Trial, add_waves, camera, trial};
 use handeye_estimate::{CameraKnowledge, Method, Observations, Options};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 use rayon::prelude::*;
 
 /// A mild barrel lens, as in the Monte-Carlo study.
@@ -60,12 +60,12 @@ struct Group {
     last_alone_is_odd: bool,
 }
 
-fn session(lens: Lens, views: usize, is_last: bool, seed: u64) -> (Trial, Observations) {
+fn session(lens: Lens, views: usize, is_last: bool, seed: u64) -> (Session, Observations) {
     let focal_px = if lens == Lens::Zoomed && is_last { camera().fx * ZOOM } else { camera().fx };
     let intrinsics = Intrinsics { distortion: DISTORTION, fx: focal_px, fy: focal_px, ..camera() };
     let mut trial = trial(Mode::EyeInHand, views, &REALISTIC, intrinsics, seed);
     if lens == Lens::Waves {
-        add_waves(&mut trial.views, WAVE_PX, WAVE_LENGTH_PX);
+        trial.add_waves(WAVE_PX, WAVE_LENGTH_PX);
     }
     let free = CameraKnowledge::Estimate { model: Distortion::BrownConrady([0.0; 5]), start: None };
     let observations = Observations { camera: free, ..trial.observations(true) };
@@ -73,7 +73,7 @@ fn session(lens: Lens, views: usize, is_last: bool, seed: u64) -> (Trial, Observ
 }
 
 /// `None` where nothing is stated.
-fn answer(trial: &Trial, calibration: &Calibration) -> Option<Answer> {
+fn answer(trial: &Session, calibration: &Calibration) -> Option<Answer> {
     let point = calibration.joint.as_ref()?.reference_point;
     let found = calibration.hand_eye?.mount_from_camera();
     let off_m = found.isometry() * point - trial.mount_from_camera.isometry() * point;

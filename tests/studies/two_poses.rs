@@ -11,10 +11,10 @@ use std::process::ExitCode;
 use handeye_estimate::diagnose::calibrate;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::Noise;
-use handeye_estimate::testing::sessions::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};
 use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_geometry::planar_pose;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};
 use rayon::prelude::*;
 
 const VIEWS: usize = 15;

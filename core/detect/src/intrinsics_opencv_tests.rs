@@ -13,12 +13,12 @@ use opencv::core::{Point2f, Point3f, Size, TermCriteria, TermCriteria_EPS, TermC
 use super::bridge::to_points2f;
 use super::bridge_for_tests::{camera_matrix, coefficients, isometries, numbers, to_points3f};
 use handeye_estimate::intrinsics::{Found, Options, SeenView, solve};
-use handeye_estimate::testing::BoardViews;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::Corner;
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_geometry::testing::data_folder;
+use handeye_simulate::BoardViews;
 
 const SQUARE_M: f64 = 1.0 / 32.0;
 

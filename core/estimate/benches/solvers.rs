@@ -10,10 +10,11 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use handeye_estimate::diagnose::calibrate;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::intrinsics::{Options, SeenView, solve};
-use handeye_estimate::testing::sessions::{BOARD, REALISTIC, trial};
 use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::session::{REALISTIC, trial};
 use nalgebra::{Point3, Vector2};
 
 const SIZE: (u32, u32) = (640, 480);

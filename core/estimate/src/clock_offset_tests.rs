@@ -3,8 +3,8 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::testing::sessions::noise_twist;
 use handeye_geometry::se3;
+use handeye_simulate::links::noise_twist;
 
 const OFFSET_S: f64 = 0.0437;
 

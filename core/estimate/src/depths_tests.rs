@@ -6,9 +6,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::handeye::joint::Noise;
-use crate::testing::sessions::{BOARD, Trial, camera, normal, trial};
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::depth_plane::DepthPlane;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::normal;
+use handeye_simulate::session::{Session, camera, trial};
 
 const NOISE: Noise = Noise { corner_px: 0.1, robot_m: 1e-4, robot_rad: 3e-4, ..Noise::EXACT };
 const VIEWS: usize = 12;
@@ -77,7 +80,7 @@ fn tally(sessions: u64, noise_m: f64, error_m: impl Fn(&mut ChaCha8Rng) -> Error
     tally
 }
 
-fn error_m_of(t: &Trial, found: &Fit) -> f64 {
+fn error_m_of(t: &Session, found: &Fit) -> f64 {
     let joint = found.joint.as_ref().expect("a joint estimate");
     let there = found.hand_eye.expect("a hand-eye").mount_from_camera();
     let point = joint.reference_point;

@@ -93,14 +93,14 @@ mod residuals;
 pub mod resolution;
 pub mod shared_lens;
 pub(crate) mod size;
-#[cfg(feature = "testing")]
-pub mod testing;
+#[cfg(test)]
+mod test_sessions;
 mod two_poses;
 pub mod uncertainty;
 pub mod verify;
 mod wrong_corners;
 
-use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2, Vector6};
+use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2};
 
 use crate::claim::Alternative;
 use crate::handeye::closed_form::{self, ClosedFormSolution};
@@ -115,101 +115,16 @@ use crate::intrinsics::IntrinsicsError;
 use crate::shared_lens::SharedLens;
 use crate::uncertainty::quality;
 use crate::uncertainty::widening::Widening;
-use handeye_geometry::camera::{Distortion, Intrinsics};
-use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::frames::{Camera, Pose, Target};
+pub use handeye_geometry::observations::{CameraKnowledge, DEFAULT_MODEL, Observations, ObservedView};
 use handeye_geometry::planar_pose::PoseError;
 use handeye_geometry::progress::{Stage, Work};
-use handeye_geometry::targets::TargetSpec;
 use handeye_geometry::targets::bent::BoardShape;
-use handeye_geometry::targets::depth_plane::DepthPlane;
-use handeye_geometry::targets::observation::{Corners, View};
 pub use handeye_geometry::view_equations::DepthBias;
-
-/// What was observed, from a dataset folder, a session or a live capture.
-#[derive(Debug, Clone)]
-pub struct Observations {
-    /// Where the camera sits; `None` when there is no robot and only the camera is calibrated.
-    pub mode: Option<Mode>,
-    /// The target.
-    pub target: TargetSpec,
-    /// Width and height of the images in pixels.
-    pub image_size: (u32, u32),
-    /// What is known about the camera.
-    pub camera: CameraKnowledge,
-    /// One entry per image, in the order of the pose table.
-    pub views: Vec<ObservedView>,
-}
-
-/// One image.
-#[derive(Debug, Clone)]
-pub struct ObservedView {
-    /// Its name in reports.
-    pub name: String,
-    /// The reported robot pose; `None` when there is no robot.
-    pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// The corners; `None` when the target was not found.
-    pub corners: Option<Corners>,
-    /// How the tip turns with each joint, as in [`handeye_geometry::targets::observation::View::tip_by_joint`]; empty where it is not known.
-    pub tip_by_joint: Vec<Vector6<f64>>,
-    /// The plane of the target by the depths of the image; `None` where none were measured.
-    pub depth: Option<DepthPlane>,
-    /// A target pose measured elsewhere, used when there are no corners.
-    pub camera_from_target: Option<Pose<Camera, Target>>,
-    /// Whether the view takes part; one that does not is listed as [`ViewStatus::Excluded`] and touches no number.
-    pub in_fit: bool,
-}
-
-impl ObservedView {
-    /// A view that takes part, of a robot whose joint angles are not known.
-    pub fn new(name: impl Into<String>, base_from_tip: Option<Pose<Base, Tip>>, corners: Option<Corners>) -> Self {
-        Self {
-            name: name.into(),
-            base_from_tip,
-            corners,
-            tip_by_joint: Vec::new(),
-            depth: None,
-            camera_from_target: None,
-            in_fit: true,
-        }
-    }
-}
-
-impl From<&View> for ObservedView {
-    /// A view that takes part.
-    fn from(view: &View) -> Self {
-        Self {
-            tip_by_joint: view.tip_by_joint.clone(),
-            depth: view.depth,
-            corners: Some(view.corners.clone()),
-            ..Self::new(view.name.clone(), Some(view.base_from_tip), None)
-        }
-    }
-}
-
-/// What is known about the camera.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CameraKnowledge {
-    /// These intrinsics, taken as exact.
-    Fixed(Intrinsics),
-    /// Intrinsics are estimated.
-    Estimate {
-        /// The lens model; its coefficients do not matter.
-        model: Distortion,
-        /// Where to start; `None` finds a start from the views.
-        start: Option<Intrinsics>,
-    },
-}
-
-impl CameraKnowledge {
-    /// What is known when nothing is stated: intrinsics are estimated with [`DEFAULT_MODEL`].
-    pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
-}
 
 /// Views of a good session: the noise levels rest on as many numbers, and with ten they are known to a fifth.
 pub const GOOD_VIEWS: usize = 10;
-
-/// Lens model that is estimated when none is named: what OpenCV estimates by default.
-pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
 
 /// Which answer is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -3,9 +3,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::fit_with;
-use crate::testing::sessions::{REALISTIC, camera, noise_twist, trial};
 use handeye_geometry::frames::Pose;
 use handeye_geometry::se3;
+use handeye_simulate::links::noise_twist;
+use handeye_simulate::session::{REALISTIC, camera, trial};
 
 /// Of a target pose per axis: a millimetre and a tenth of a degree.
 const SEEN: (f64, f64) = (1e-3, 1.75e-3);

@@ -1,8 +1,9 @@
 use std::cell::RefCell;
 
 use super::*;
-use crate::testing::sessions::{REALISTIC, Trial, add_print_errors, add_waves, camera, trial};
+use handeye_geometry::camera::Distortion;
 use handeye_geometry::progress::{CancelToken, Progress};
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 fn solve(observations: &Observations, method: Method) -> Fit {
     fit(observations, method, &CancelToken::default()).expect("solves")
@@ -14,7 +15,7 @@ fn solve_all(observations: &Observations) -> Fit {
     fit_with(observations, Method::Joint, keep, &CancelToken::default()).expect("solves")
 }
 
-fn set(views: usize, seed: u64) -> Trial {
+fn set(views: usize, seed: u64) -> Session {
     trial(Mode::EyeInHand, views, &REALISTIC, camera(), seed)
 }
 
@@ -50,7 +51,7 @@ fn a_view_left_out_changes_the_answer_as_if_it_were_not_there() {
 #[test]
 fn residuals_stand_where_corners_were_measured_with_a_lens_beyond_its_model_too() {
     let mut t = set(30, 49);
-    add_waves(&mut t.views, 0.2, 300.0);
+    t.add_waves(0.2, 300.0);
     let found = solve(&t.observations(true), Method::Joint);
     let shown = found.joint.as_ref().and_then(|joint| joint.residual_distortion.as_ref()).expect("the waves are seen");
     assert!(shown.rms_px > 0.1, "{shown:?}");
@@ -240,7 +241,7 @@ fn a_board_drawn_on_the_pixels_of_a_bitmap_is_no_bent_one_and_no_other_lens() {
         let mut t = set(15, 6400 + seed);
         let on_pixel = |m: f64| (m / pixel_m + 0.37 * seed as f64).round() * pixel_m - m;
         let errors: Vec<_> = t.points.iter().map(|p| Vector2::new(on_pixel(p.x), on_pixel(p.y))).collect();
-        add_print_errors(&mut t, &errors);
+        t.add_print_errors(&errors);
         let joint = solve(&t.observations(true), Method::Joint).joint.expect("joint");
         let print = joint.print.expect("seen");
         // A twelfth of the square of a pixel, but for what a shift of all is.

@@ -31,10 +31,10 @@ pub(super) fn take_agreeing(
 mod tests {
     use crate::handeye::Mode;
     use crate::handeye::joint::Noise;
-    use crate::testing::sessions::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};
     use crate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus, fit};
     use handeye_geometry::planar_pose::{Solution, solve};
     use handeye_geometry::progress::CancelToken;
+    use handeye_simulate::session::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};
 
     #[test]
     fn good_views_whose_corners_fit_the_wrong_pose_better_are_not_called_outliers() {

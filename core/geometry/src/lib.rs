@@ -19,6 +19,7 @@
 //! | [`frames`], [`se3`] | poses that name their frames; exponential and logarithm |
 //! | [`camera`] | pinhole and fisheye lenses, projection, derivatives |
 //! | [`targets`] | chessboards, grids of dots, ChArUco, AprilGrid as data; observed corners |
+//! | [`observations`] | what a session saw: modes, views, what is known of the lens, levels of noise |
 //! | [`planar_pose`] | pose of a flat target from its corners, and its mirror solution |
 //! | [`view_equations`] | normal equations of a view, which estimators share |
 //! | [`depth`] | depth images; the plane of a target in them is in [`targets::depth_plane`] |
@@ -31,6 +32,7 @@ pub mod camera;
 pub mod depth;
 pub mod frames;
 pub mod natural_order;
+pub mod observations;
 pub mod planar_pose;
 pub mod point_error;
 pub mod progress;

@@ -10,7 +10,7 @@ use super::tests::{Written, in_hand, known, numbers, observed, pose_of, row, sav
 use super::*;
 use handeye_dataset::Dataset;
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::testing::faulty;
+
 use handeye_estimate::{CameraKnowledge, Observations};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
@@ -19,12 +19,10 @@ const VIEWS: usize = 9;
 
 /// The robot's poses, and the target as an exact camera sees it.
 fn pairs(session: &Observations, mode: Mode) -> Vec<(Isometry3<f64>, Isometry3<f64>)> {
-    let (mount_from_camera, anchor_from_target) = faulty::links(mode);
+    let links = handeye_simulate::session::links(mode);
     let pair = |view: usize| {
         let base_from_tip = session.views[view].base_from_tip.expect("a pose");
-        let anchor_from_mount = mode.anchor_from_mount(&base_from_tip);
-        let seen = mount_from_camera.inverse() * anchor_from_mount.inverse() * anchor_from_target;
-        (*base_from_tip.isometry(), *seen.isometry())
+        (*base_from_tip.isometry(), *links.camera_from_target(&base_from_tip).isometry())
     };
     (0..session.views.len()).map(pair).collect()
 }

@@ -15,15 +15,16 @@ use tempfile::TempDir;
 use super::*;
 use handeye_dataset::Dataset;
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::testing::faulty;
+
 use handeye_estimate::{CameraKnowledge, Observations};
 use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
 use handeye_geometry::targets::TargetSpec;
+use handeye_simulate::session::{Setup, observed as observed_session};
 
 pub(super) fn observed(mode: Mode, views: usize, seed: u64) -> Observations {
-    faulty::session(&faulty::Setup::new(mode, views, seed))
+    observed_session(&Setup::new(mode, views, seed))
 }
 
 pub(super) fn pose_of(session: &Observations, view: usize) -> Isometry3<f64> {

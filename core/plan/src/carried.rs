@@ -86,7 +86,7 @@ mod tests {
 
     use super::*;
     use crate::Obstacle;
-    use handeye_estimate::testing::sessions::BOARD;
+    use handeye_geometry::testing::BOARD;
 
     /// Against the sheet itself, point by point.
     #[test]

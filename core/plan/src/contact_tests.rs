@@ -3,8 +3,8 @@ use nalgebra::{Isometry3, Vector3};
 use super::*;
 use crate::{ArmBody, Carried, SpeedLimits, WorkVolume};
 use handeye_arm::ArmKind;
-use handeye_estimate::testing::sessions::BOARD;
 use handeye_geometry::frames::Pose;
+use handeye_geometry::testing::BOARD;
 
 const CLEARANCE_M: f64 = 0.02;
 

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::ArmBody;
     use handeye_arm::ArmKind;
-    use handeye_estimate::testing::sessions::BOARD;
+    use handeye_geometry::testing::BOARD;
 
     /// A camera beyond the forearm does not see the board behind it, and one on the other side does; all links of the wrist are
     /// about the board in both.

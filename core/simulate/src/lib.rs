@@ -1,4 +1,13 @@
-//! Images of targets whose corners are known, for tests, studies and benchmarks. No shipped program has it.
+//! Sessions and images of which the truth is known, for tests, studies and benchmarks. No shipped program has it.
+//!
+//! Where lenses, links, arms and sheets put things is written out here: from `handeye_geometry` and `handeye_arm` come types and the
+//! numbers of data sheets alone, so that an estimator is not judged by its own formulas.
+//!
+//! | module | sessions |
+//! | --- | --- |
+//! | [`session`] | poses and corners of a robot with a camera, with one [`Fault`](session::Fault) or several if wanted |
+//! | [`BoardViews`] | corners of a camera without a robot |
+//! | [`lens`], [`links`] | what these are made of |
 //!
 //! | module | images |
 //! | --- | --- |
@@ -17,11 +26,18 @@
 //! assert_eq!((scene.render(1).dimensions(), scene.truth().len()), ((640, 480), 54));
 //! ```
 
+mod arm;
+mod board_views;
 #[cfg(feature = "print")]
 mod drawn;
 mod exact;
 pub mod flat_board;
+pub mod lens;
+pub mod links;
 pub mod moving_board;
 mod scene;
+pub mod session;
 
+pub use arm::{LinkErrors, Servo};
+pub use board_views::{BoardViews, SharedErrors};
 pub use scene::Scene;

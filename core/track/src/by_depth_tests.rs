@@ -2,9 +2,9 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::moving_board::{self, FAR_M, Watch, board_at, error};
-use handeye_estimate::testing::sessions::GRID;
 use handeye_geometry::frames::Target;
 use handeye_geometry::targets::observation::Corners;
+use handeye_geometry::testing::GRID;
 
 fn board() -> Pose<Base, Target> {
     board_at(Vector3::zeros(), Vector3::new(0.3, -0.2, 0.1))

@@ -4,7 +4,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::moving_board::{FAR_M, Stage, Watch, board_at, lens};
-use handeye_estimate::testing::sessions::{BOARD, normal};
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::normal;
 
 /// What corners with hard edges leave open, about the middle of the board: four tenths of a degree of tilt.
 const CORNERS: [f64; 6] = [5e-5, 5e-5, 1e-4, 7e-3, 7e-3, 3e-4];

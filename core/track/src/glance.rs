@@ -105,7 +105,7 @@ mod tests {
 
     use super::*;
     use crate::moving_board::{Stage, Watch, board_at};
-    use handeye_estimate::testing::sessions::GRID;
+    use handeye_geometry::testing::GRID;
 
     #[test]
     fn an_image_without_board_shows_none_and_one_with_a_board_may() {

@@ -2,7 +2,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::*;
 use crate::moving_board::{base_from_tip, board_at, calibrated, tip_from_camera};
-use handeye_estimate::testing::sessions::GRID;
+use handeye_geometry::testing::GRID;
 
 fn estimate() -> Estimate {
     Estimate {

@@ -4,9 +4,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::{BoardDetection, State};
-use handeye_estimate::testing::sessions::normal;
 use handeye_geometry::frames::{Base, Pose, Target};
 use handeye_geometry::targets::observation::Corners;
+use handeye_simulate::links::normal;
 
 /// Hard-edged images: the tilt to two tenths of a degree.
 const SIGMA: [f64; 6] = [1e-4, 1e-4, 2e-4, 3e-3, 3e-3, 2e-4];

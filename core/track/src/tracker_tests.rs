@@ -5,10 +5,10 @@ use super::*;
 use crate::MotionModel;
 use crate::moving_board::{self, Cover, PERIOD_S, Watch, board_at, error, rms};
 use handeye_estimate::handeye::HandEye;
-use handeye_estimate::testing::sessions::GRID;
 use handeye_geometry::camera::CameraError;
 use handeye_geometry::frames::Target;
 use handeye_geometry::targets::Grid;
+use handeye_geometry::testing::GRID;
 
 fn still() -> Pose<Base, Target> {
     board_at(Vector3::zeros(), Vector3::zeros())

@@ -5,12 +5,12 @@ use handeye_estimate::diagnose::doctor::Diagnosis;
 use handeye_estimate::diagnose::findings::FindingCode as Code;
 use handeye_estimate::diagnose::findings::Severity;
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::testing::sessions::{GRID, camera};
 use handeye_geometry::frames::Pose;
+use handeye_geometry::observations::Noise;
 use handeye_geometry::planar_pose;
+use handeye_geometry::testing::GRID;
+use handeye_simulate::session::{Fault, REALISTIC, Setup, camera, changed, observed, observed_of};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
-
-use handeye_estimate::testing::faulty::{Fault, Setup, changed, session, session_of};
 
 pub struct Case {
     pub name: &'static str,
@@ -40,7 +40,7 @@ const IN_HAND: Mode = Mode::EyeInHand;
 const TO_HAND: Mode = Mode::EyeToHand;
 
 fn healthy(mode: Mode, seed: u64) -> Observations {
-    session(&Setup::new(mode, 20, seed))
+    observed(&Setup::new(mode, 20, seed))
 }
 
 /// Views of the board with turns of the camera about given axes.
@@ -60,7 +60,7 @@ fn turned(
             Isometry3::from_parts(Translation3::from(place), rotation) * Translation3::from(-centre)
         })
         .collect();
-    session_of(&setup, &planned)
+    observed_of(&setup, &planned)
 }
 
 fn still(_: f64) -> Vector3<f64> {
@@ -74,16 +74,16 @@ fn wave(part: f64) -> Vector3<f64> {
 
 fn slipped(mode: Mode, seed: u64, from: usize, twist: [f64; 6]) -> Observations {
     let fault = Fault { board_moved: Some((from, Vector6::from(twist))), ..Fault::default() };
-    session(&Setup::new(mode, 20, seed).with(fault))
+    observed(&Setup::new(mode, 20, seed).with(fault))
 }
 
 fn scaled(mode: Mode, seed: u64, scale: f64) -> Observations {
-    session(&Setup::new(mode, 20, seed).with(Fault { scale, ..Fault::default() }))
+    observed(&Setup::new(mode, 20, seed).with(Fault { scale, ..Fault::default() }))
 }
 
 fn in_motion(seed: u64, views: &[usize], twist: [f64; 6]) -> Observations {
     let moving = views.iter().map(|v| (*v, Vector6::from(twist))).collect();
-    session(&Setup::new(IN_HAND, 20, seed).with(Fault { moving, ..Fault::default() }))
+    observed(&Setup::new(IN_HAND, 20, seed).with(Fault { moving, ..Fault::default() }))
 }
 
 fn edited(mut observations: Observations, edit: impl FnOnce(&mut Observations)) -> Observations {
@@ -255,7 +255,7 @@ fn hostile() -> Vec<Case> {
         case(
             "camera bumped",
             &[Code::CameraMoved],
-            session(&Setup::new(IN_HAND, 20, 45).with(Fault {
+            observed(&Setup::new(IN_HAND, 20, 45).with(Fault {
                 camera_moved: Some((8, Vector6::new(1e-3, 0.0, 0.0, 0.01, 0.01, 0.0))),
                 ..Fault::default()
             })),
@@ -292,7 +292,7 @@ fn hostile() -> Vec<Case> {
         case(
             "joint 3 off by 0.5°",
             &[Code::JointOffset],
-            session(
+            observed(
                 &Setup { joints: true, ..Setup::new(IN_HAND, 20, 51) }
                     .with(Fault { joint: Some((2, 0.5f64.to_radians())), ..Fault::default() }),
             ),
@@ -300,7 +300,7 @@ fn hostile() -> Vec<Case> {
         case(
             "board bent by 1 mm",
             &[Code::BoardBent],
-            session(
+            observed(
                 &Setup { estimated: true, ..Setup::new(TO_HAND, 20, 56) }
                     .with(Fault { warp_m: 1e-3, ..Fault::default() }),
             ),
@@ -308,7 +308,7 @@ fn hostile() -> Vec<Case> {
         case(
             "focal length given 3 % wrong",
             &[Code::WrongIntrinsics],
-            session(&Setup::new(IN_HAND, 20, 52).with(Fault { focal: 0.03, ..Fault::default() })),
+            observed(&Setup::new(IN_HAND, 20, 52).with(Fault { focal: 0.03, ..Fault::default() })),
         ),
         case(
             "poses of another session",
@@ -322,7 +322,10 @@ fn hostile() -> Vec<Case> {
         case(
             "an arm that shakes by 5 mm and 1°",
             &[Code::InconsistentPoses],
-            session(&Setup { robot_m: 5e-3, robot_rad: 0.017, ..Setup::new(IN_HAND, 20, 55) }),
+            observed(&Setup {
+                noise: Noise { robot_m: 5e-3, robot_rad: 0.017, ..REALISTIC },
+                ..Setup::new(IN_HAND, 20, 55)
+            }),
         ),
     ]
 }

@@ -4,10 +4,12 @@ use handeye_estimate::diagnose::calibrate;
 use handeye_estimate::diagnose::doctor::{Diagnosis, diagnose};
 use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::testing::faulty::{ArmError, Fault, Servo, Setup, changed, session};
-use handeye_estimate::testing::sessions::normal;
 use handeye_estimate::{Method, Observations, ObservedView};
+use handeye_geometry::observations::Noise;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::Servo;
+use handeye_simulate::links::normal;
+use handeye_simulate::session::{ArmError, Cone, Fault, Setup, changed, observed};
 use nalgebra::{Isometry3, SMatrix, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -70,41 +72,41 @@ pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode
             let slip = Vector3::new(angle.cos(), angle.sin(), 0.0) * 5e-3 * times;
             let turn = Vector3::z() * rng.random_range(-0.01..0.01) * times;
             let fault = Fault { board_moved: Some((12, twist(slip, turn))), ..Fault::default() };
-            (session(&setup.with(fault)), FindingCode::BoardMoved)
+            (observed(&setup.with(fault)), FindingCode::BoardMoved)
         }
         1 => {
             let scale = if rng.random::<bool>() { 0.02 } else { -0.02 } * times;
-            (session(&setup.with(Fault { scale, ..Fault::default() })), FindingCode::WrongScale)
+            (observed(&setup.with(Fault { scale, ..Fault::default() })), FindingCode::WrongScale)
         }
         2 => {
             let offset = 0.2f64.to_radians() * times * if rng.random::<bool>() { 1.0 } else { -1.0 };
-            (session(&setup.with(Fault { joint: Some((3, offset)), ..Fault::default() })), FindingCode::JointOffset)
+            (observed(&setup.with(Fault { joint: Some((3, offset)), ..Fault::default() })), FindingCode::JointOffset)
         }
         3 => {
             // An image one frame of 30 Hz late, of an arm at 0.1 m/s and 10°/s.
             let motion = twist(direction(&mut rng) * 3.3e-3, direction(&mut rng) * 0.33f64.to_radians()) * times;
             let moving = vec![(rng.random_range(0..20), motion)];
-            (session(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)
+            (observed(&setup.with(Fault { moving, ..Fault::default() })), FindingCode::OutlierView)
         }
-        4 => (changed(session(&setup), |p| p.inverse()), FindingCode::InvertedPoses),
+        4 => (changed(observed(&setup), |p| p.inverse()), FindingCode::InvertedPoses),
         5 => {
             let in_millimetres = |mut p: Isometry3<f64>| {
                 p.translation.vector *= 1e3;
                 p
             };
-            (changed(session(&setup), in_millimetres), FindingCode::WrongLengthUnit)
+            (changed(observed(&setup), in_millimetres), FindingCode::WrongLengthUnit)
         }
         6 | 7 => {
             // An image or a pose, or two, that is missing or there twice: at a view, or before the first.
             let by = [-2, -1, 1, 2][rng.random_range(0..4usize)];
             let from = if fault == 6 { rng.random_range(4..=14) } else { 0 };
             let rows = (0..20).map(|row: usize| if row < from { Some(row) } else { row.checked_add_signed(by) });
-            (paired(session(&setup), rows), FindingCode::ShiftedPoses)
+            (paired(observed(&setup), rows), FindingCode::ShiftedPoses)
         }
         _ => {
             let mut by_letters: Vec<usize> = (0..20).collect();
             by_letters.sort_by_key(|view| (view + 1).to_string());
-            let mut session = session(&setup);
+            let mut session = observed(&setup);
             for (n, view) in session.views.iter_mut().enumerate() {
                 view.name = format!("{}.png", n + 1);
             }
@@ -130,17 +132,23 @@ fn paired(mut session: Observations, rows: impl Iterator<Item = Option<usize>>) 
     session
 }
 
+fn cone(rng: &mut ChaCha8Rng) -> Cone {
+    Cone { tilt_deg: rng.random_range(25.0..50.0), roll_deg: rng.random_range(20.0..120.0), ..Cone::PUBLISHED }
+}
+
 /// A healthy session: set-up, number of views, noise, geometry and what is known are drawn at random.
 pub fn healthy(seed: u64) -> Observations {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x4ea1);
     let mode = if rng.random::<bool>() { Mode::EyeInHand } else { Mode::EyeToHand };
     let robot = [(1e-6, 1e-5), (1e-4, 0.02), (5e-4, 0.1)][rng.random_range(0..3usize)];
-    session(&Setup {
-        tilt_deg: rng.random_range(25.0..50.0),
-        roll_deg: rng.random_range(20.0..120.0),
-        corner_px: [0.03, 0.1, 0.3][rng.random_range(0..3usize)],
-        robot_m: robot.0,
-        robot_rad: f64::to_radians(robot.1),
+    observed(&Setup {
+        cone: cone(&mut rng),
+        noise: Noise {
+            corner_px: [0.03, 0.1, 0.3][rng.random_range(0..3usize)],
+            robot_m: robot.0,
+            robot_rad: f64::to_radians(robot.1),
+            ..Noise::EXACT
+        },
         estimated: rng.random(),
         joints: rng.random(),
         ..Setup::new(mode, rng.random_range(10..=40), seed)
@@ -169,12 +177,9 @@ pub fn as_met(seed: u64) -> (Observations, Setup) {
     let warp_m = if rng.random::<bool>() { 0.0 } else { rng.random_range(-1e-3..1e-3) };
     let corner_px = [0.03, 0.1, 0.3][rng.random_range(0..3usize)];
     let setup = Setup {
-        tilt_deg: rng.random_range(25.0..50.0),
-        roll_deg: rng.random_range(20.0..120.0),
-        corner_px,
+        cone: cone(&mut rng),
+        noise: Noise { corner_px, robot_m: robot.0, robot_rad: f64::to_radians(robot.1), ..Noise::EXACT },
         shared_px: if rng.random::<bool>() { 0.5 * corner_px } else { 0.0 },
-        robot_m: robot.0,
-        robot_rad: f64::to_radians(robot.1),
         estimated: rng.random(),
         joints: !matches!(arm_error, ArmError::Links(_)) && rng.random(),
         by_level: rng.random(),
@@ -182,7 +187,7 @@ pub fn as_met(seed: u64) -> (Observations, Setup) {
         fault: Fault { warp_m, ..Fault::default() },
         ..Setup::new(mode, rng.random_range(10..=40), seed)
     };
-    (session(&setup), setup)
+    (observed(&setup), setup)
 }
 
 /// A healthy session of an arm of servo motors: gears that are not centred, play, links that give way under their weight and
@@ -199,10 +204,13 @@ pub fn servo(seed: u64) -> Setup {
         step_rad: std::f64::consts::TAU / 4096.0,
     };
     Setup {
-        corner_px: [0.05, 0.1, 0.2][rng.random_range(0..3usize)],
+        noise: Noise {
+            corner_px: [0.05, 0.1, 0.2][rng.random_range(0..3usize)],
+            robot_m: 5e-5,
+            robot_rad: 0.01f64.to_radians(),
+            ..Noise::EXACT
+        },
         shared_px: if rng.random::<bool>() { 0.05 } else { 0.0 },
-        robot_m: 5e-5,
-        robot_rad: 0.01f64.to_radians(),
         estimated: rng.random(),
         by_level: rng.random(),
         arm_error: ArmError::Servo(servo),
@@ -238,7 +246,7 @@ pub fn names_a_move(finding: &Finding) -> bool {
 /// Error of the size found for a target that is 2 % too large, over its uncertainty, squared.
 pub fn scale_error(estimated: bool, seed: u64) -> Option<f64> {
     let setup = Setup { estimated, ..Setup::new(Mode::EyeInHand, 20, seed) };
-    let diagnosis = examined_alone(&session(&setup.with(Fault { scale: 0.02, ..Fault::default() })));
+    let diagnosis = examined_alone(&observed(&setup.with(Fault { scale: 0.02, ..Fault::default() })));
     let scale = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale)?.estimate?;
     Some(((scale.value - 1.02) / scale.sigma?).powi(2))
 }

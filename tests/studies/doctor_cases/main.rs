@@ -15,8 +15,8 @@ use handeye_estimate::Options;
 use handeye_estimate::diagnose::doctor::Detail;
 use handeye_estimate::diagnose::findings::Severity;
 use handeye_estimate::shared_lens::{NamedSession, calibrate_sharing_lens};
-use handeye_estimate::testing::faulty::{Setup, session};
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{Setup, observed};
 use handeye_wording::English;
 
 fn number(argument: Option<String>, otherwise: u64) -> u64 {
@@ -37,7 +37,7 @@ fn as_met(first: u64, sessions: u64) {
         alarmed += usize::from(!named.is_empty());
         for finding in named {
             *alarms.entry(format!("{:?}", finding.code)).or_default() += 1;
-            println!("as met {seed}, {setup}: {finding}");
+            println!("as met {seed}, {setup:?}: {finding}");
         }
     }
     println!("a cause named in {alarmed} of {sessions} healthy sessions as they are met: {alarms:?}\n");
@@ -55,13 +55,13 @@ fn servo(first: u64, sessions: u64) {
                 let twist = [slip_m * 0.6, -slip_m * 0.8, 0.0, 0.0, 0.0, 0.0].into();
                 setup.fault.board_moved = Some((setup.views / 2, twist));
             }
-            let diagnosis = faults::examined(&session(&setup));
+            let diagnosis = faults::examined(&observed(&setup));
             let moves: Vec<_> = diagnosis.findings.iter().filter(|finding| faults::names_a_move(finding)).collect();
             named += usize::from(!moves.is_empty());
             for finding in moves {
                 *codes.entry(format!("{:?}", finding.code)).or_default() += 1;
                 if slip_m == 0.0 {
-                    println!("servo {seed}, {setup}: {finding}");
+                    println!("servo {seed}, {setup:?}: {finding}");
                 }
             }
         }
@@ -73,7 +73,7 @@ fn servo(first: u64, sessions: u64) {
 fn lenses(first: u64, groups: u64) {
     for group in first..first + groups {
         let sessions: Vec<_> =
-            (0..11).map(|k| session(&Setup { estimated: true, ..faults::servo(11 * group + k) })).collect();
+            (0..11).map(|k| observed(&Setup { estimated: true, ..faults::servo(11 * group + k) })).collect();
         let names: Vec<String> = (0..11).map(|k| k.to_string()).collect();
         let named: Vec<_> =
             names.iter().zip(&sessions).map(|(name, observations)| NamedSession { name, observations }).collect();

@@ -6,9 +6,9 @@ use handeye_arm::JointValues;
 use handeye_cell::scene::Scene;
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_estimate::handeye::joint::{ExpectedView, ViewModel};
-use handeye_estimate::testing::sessions::BOARD;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::se3;
+use handeye_geometry::testing::BOARD;
 use handeye_plan::guided::GuidedOptions;
 use handeye_plan::guided::candidates::ViewRange;
 use handeye_plan::guided::design::{Design, weight_about};
@@ -143,7 +143,7 @@ impl Bench {
             }
             cell.observations.views.truncate(count);
             let estimated = cell.calibrate()?.hand_eye?.mount_from_camera();
-            let off = se3::log((cell.mount_from_camera.inverse() * estimated).isometry());
+            let off = se3::log((cell.links.mount_from_camera.inverse() * estimated).isometry());
             Some(off.dot(&(self.weight * off)).sqrt())
         })
     }

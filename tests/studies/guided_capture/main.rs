@@ -163,7 +163,9 @@ fn looks(arm: CellArm, mode: Mode, sessions: u64) {
         let known = cell.known(calibration.as_ref(), 0.0);
         let mut guide = HandGuide::new(GuidedOptions { goal_m: 0.0, ..GuidedOptions::default() });
         let next = guide.next(&known, &seen, truth.intrinsics(), &CancelToken::default());
-        let (HandNext::Take(wanted), Some(corners)) = (next, hand::corners(&truth, &seen)) else { continue };
+        let (HandNext::Take(wanted), Some(corners)) = (next, hand::corners(truth.intrinsics(), &seen)) else {
+            continue;
+        };
         let began = Instant::now();
         let _judged = wanted.judge(&corners, &tip);
         times.push(began.elapsed().as_secs_f64() * 1e3);

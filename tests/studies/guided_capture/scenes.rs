@@ -6,10 +6,11 @@ use handeye_arm::JointValues;
 use handeye_cell::scene::{BoardSpec, RelativeTo, RobotSpec, Scene, ShippedScene};
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::Noise;
-use handeye_estimate::testing::sessions::BOARD;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+use handeye_geometry::testing::BOARD;
 use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places};
 use handeye_plan::{Arm, Obstacle, Surroundings, ViewSetup};
+use handeye_simulate::links::Links;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -88,7 +89,8 @@ fn places(views: ViewSetup, joints: JointValues, mode: Mode, goes_with_board: &d
             changed_over(&arm, &joints, tip_from_camera.isometry(), base_from_target.isometry())?
         }
     };
-    Some(Places { arm, joints, around: Surroundings::of(stands), mount_from_camera, anchor_from_target, intrinsics })
+    let links = Links { mode, mount_from_camera, anchor_from_target };
+    Some(Places { arm, joints, around: Surroundings::of(stands), links, intrinsics })
 }
 
 /// The board on the tip, where the camera was and facing where it looked, and the camera where it has the same first view.

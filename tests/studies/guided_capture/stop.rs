@@ -2,9 +2,9 @@
 
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::Noise;
-use handeye_estimate::testing::sessions::REALISTIC;
 use handeye_plan::guided::{Ending, GuidedOptions, Step};
 use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, GuidedRun, Untold};
+use handeye_simulate::session::REALISTIC;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 pub fn stop(sessions: u64, only: &str) {

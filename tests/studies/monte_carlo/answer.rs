@@ -4,7 +4,6 @@ use handeye_estimate::handeye::PosePair;
 use handeye_estimate::handeye::closed_form::{self, ClosedFormSolution};
 use handeye_estimate::handeye::joint::{self, Free, JointProblem, JointStart, Noise, SmallSample};
 use handeye_estimate::intrinsics::{self, Options, SeenView};
-use handeye_estimate::testing::sessions::BOARD;
 use handeye_estimate::uncertainty::quality;
 use handeye_estimate::{self as estimate, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_geometry::camera::{Distortion, Intrinsics};
@@ -12,6 +11,7 @@ use handeye_geometry::frames::{Camera, Mount, Pose};
 use handeye_geometry::planar_pose;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+use handeye_geometry::testing::BOARD;
 use nalgebra::{Matrix6, Point3};
 
 use super::scene::Trial;

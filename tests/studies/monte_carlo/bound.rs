@@ -128,8 +128,8 @@ impl Normals {
         let of_view = |tip: &Isometry3<f64>| {
             let model = Model {
                 eye_in_hand: trial.cell.mode == Mode::EyeInHand,
-                hand_eye: Rigid::of(trial.mount_from_camera.isometry()),
-                target: Rigid::of(trial.anchor_from_target.isometry()),
+                hand_eye: Rigid::of(trial.links.mount_from_camera.isometry()),
+                target: Rigid::of(trial.links.anchor_from_target.isometry()),
                 tip: Rigid::of(tip),
                 lens,
             };

@@ -2,11 +2,14 @@
 
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::Noise;
-use handeye_estimate::testing::sessions::{BOARD, Cone, add_field, base_from_tip, noisy, normal, reported};
 use handeye_geometry::camera::{Distortion, Intrinsics};
-use handeye_geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::observation::{Corner, View};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector2, Vector3};
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::lens::{is_in_image, pixel};
+use handeye_simulate::links::{Links, normal, reported};
+use handeye_simulate::session::{Cone, add_field, noisy};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector2, Vector3};
 use rand::seq::SliceRandom as _;
 use rand::{Rng, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -35,8 +38,7 @@ pub struct Trial {
     pub cell: Cell,
     pub points: Vec<Point3<f64>>,
     pub intrinsics: Intrinsics,
-    pub mount_from_camera: Pose<Mount, Camera>,
-    pub anchor_from_target: Pose<Anchor, Target>,
+    pub links: Links,
     /// Where the tip really was.
     pub true_base_from_tip: Vec<Pose<Base, Tip>>,
     pub views: Vec<View>,
@@ -48,23 +50,15 @@ pub fn intrinsics() -> Intrinsics {
     Intrinsics { distortion: DISTORTION, ..Intrinsics::from_view_angle(640, 480, VIEW_ANGLE_DEG.to_radians()) }
 }
 
-fn pose<D, S>(t: [f64; 3], rotation_vector: [f64; 3]) -> Pose<D, S> {
-    Pose::from_isometry(Isometry3::from_parts(
-        Translation3::from(t),
-        UnitQuaternion::from_scaled_axis(Vector3::from(rotation_vector)),
-    ))
-}
-
 /// Hand-eye and place of the target: in the hand, the camera of the reference cell, 50 mm beside the tip and turned by a
 /// quarter, before its upright board; to the hand, a camera on a stand beside the arm, which holds the board.
-fn truth(mode: Mode) -> (Pose<Mount, Camera>, Pose<Anchor, Target>) {
-    match mode {
-        Mode::EyeInHand => (
-            pose([0.05, 0.0, 0.0], [0.0, 0.0, std::f64::consts::FRAC_PI_2]),
-            pose([-0.19, -0.4, 0.85], [-1.57, 0.03, 0.02]),
-        ),
-        Mode::EyeToHand => (pose([0.9, 0.15, 0.6], [-1.2, 1.2, -1.1]), pose([-0.07, 0.04, 0.06], [3.1, 0.05, -0.1])),
-    }
+fn truth(mode: Mode) -> Links {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let (camera, target) = match mode {
+        Mode::EyeInHand => ([[0.05, 0.0, 0.0], [0.0, 0.0, quarter]], [[-0.19, -0.4, 0.85], [-1.57, 0.03, 0.02]]),
+        Mode::EyeToHand => ([[0.9, 0.15, 0.6], [-1.2, 1.2, -1.1]], [[-0.07, 0.04, 0.06], [3.1, 0.05, -0.1]]),
+    };
+    Links::at(mode, camera, target)
 }
 
 fn direction(rng: &mut impl Rng) -> UnitVector3<f64> {
@@ -82,7 +76,7 @@ fn true_pixels(
             && px.x < f64::from(intrinsics.width) - 1.0 - MARGIN_PX
             && px.y < f64::from(intrinsics.height) - 1.0 - MARGIN_PX
     };
-    points.iter().map(|p| intrinsics.project(&(camera_from_target.isometry() * p)).ok().filter(inside)).collect()
+    points.iter().map(|p| pixel(intrinsics, &(camera_from_target.isometry() * p)).filter(inside)).collect()
 }
 
 /// Draws a trial. Trials of one seed and different numbers are independent; the same pair gives the same trial.
@@ -91,17 +85,12 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
     rng.set_stream(number);
     let points = BOARD.points();
     let intrinsics = intrinsics();
-    let (mount_from_camera, anchor_from_target) = truth(cell.mode);
+    let links = truth(cell.mode);
     let (mut true_base_from_tip, mut pixels) = (Vec::new(), Vec::new());
     while pixels.len() < cell.poses {
-        let camera_from_target = Pose::from_isometry(Cone::PUBLISHED.draw(&mut rng));
+        let camera_from_target = Pose::from_isometry(Cone::PUBLISHED.draw(&BOARD, &mut rng));
         if let Some(px) = true_pixels(&intrinsics, &points, &camera_from_target) {
-            true_base_from_tip.push(base_from_tip(
-                cell.mode,
-                &mount_from_camera,
-                &anchor_from_target,
-                &camera_from_target,
-            ));
+            true_base_from_tip.push(links.base_from_tip(&camera_from_target));
             pixels.push(px);
         }
     }
@@ -112,20 +101,9 @@ pub fn trial(cell: &Cell, seed: u64, number: u64) -> Trial {
         let seen = |(i, px): (usize, &Vector2<f64>)| Corner::new(i, noisy(&mut rng, px, noise.corner_px));
         views.push(View::new(format!("view {index}"), reported, px.iter().enumerate().map(seen).collect::<Vec<_>>()));
     }
-    if noise.field_m > 0.0 {
-        add_field(&mut rng, noise, &mut views);
-    }
+    add_field(&mut rng, noise, &mut views);
     let wrong = vec![false; cell.poses];
-    let mut trial = Trial {
-        cell: *cell,
-        points,
-        intrinsics,
-        mount_from_camera,
-        anchor_from_target,
-        true_base_from_tip,
-        views,
-        wrong,
-    };
+    let mut trial = Trial { cell: *cell, points, intrinsics, links, true_base_from_tip, views, wrong };
     if cell.corrupted {
         trial.corrupt(number, &mut rng);
     }
@@ -167,18 +145,13 @@ impl Trial {
     fn move_the_board(&mut self, index: usize, rng: &mut impl Rng) {
         let heading = rng.random_range(0.0..std::f64::consts::TAU);
         let shift = Vector3::new(heading.cos(), heading.sin(), 0.0) * rng.random_range(0.005..0.02);
-        let camera_from_target = handeye_estimate::handeye::joint::camera_from_target(
-            self.cell.mode,
-            &self.true_base_from_tip[index],
-            &self.mount_from_camera,
-            &self.anchor_from_target,
-        );
+        let camera_from_target = self.links.camera_from_target(&self.true_base_from_tip[index]);
         let (points, intrinsics) = (&self.points, &self.intrinsics);
         let moved = |corner: &Corner| {
-            let pixel = |p: Point3<f64>| intrinsics.project(&(camera_from_target.isometry() * p)).ok();
+            let pixel = |p: Point3<f64>| pixel(intrinsics, &(camera_from_target.isometry() * p));
             let point = points[corner.index];
             let px = corner.px + pixel(point + shift)? - pixel(point)?;
-            intrinsics.contains(&px).then_some(Corner { px, ..*corner })
+            is_in_image(intrinsics, &px).then_some(Corner { px, ..*corner })
         };
         let corners = &mut self.views[index].corners;
         *corners = corners.iter().filter_map(moved).collect();

@@ -60,7 +60,7 @@ fn mahalanobis2(covariance: &Matrix6<f64>, error: &Vector6<f64>) -> Option<f64> 
 
 impl Judged {
     fn new(trial: &Trial, answer: &Answer) -> Option<Self> {
-        let (truth, estimate) = (trial.mount_from_camera.isometry(), answer.mount_from_camera.isometry());
+        let (truth, estimate) = (trial.links.mount_from_camera.isometry(), answer.mount_from_camera.isometry());
         let error = bound::error_twist(truth, estimate);
         let mahalanobis2 = mahalanobis2(&answer.covariance, &error)?;
         let at_point = truth.inverse() * estimate * answer.reference_point - answer.reference_point;
@@ -113,7 +113,7 @@ pub fn run(cell: &Cell, seed: u64, number: u64, product: bool) -> Result<Outcome
     let from = |noise_given| start.as_ref().map_err(Clone::clone).and_then(|s| answer::joint(&trial, s, noise_given));
     let given = judged(from(true));
     let estimated = judged(if product { answer::product(&trial) } else { from(false) });
-    let truth = trial.mount_from_camera.isometry();
+    let truth = trial.links.mount_from_camera.isometry();
     let closed_forms = start.as_ref().map_or_else(
         |_| vec![None; closed_form::all().len()],
         |s| {

@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::testing::sessions::{REALISTIC, camera, trial};
 use handeye_geometry::camera::Intrinsics;
 use handeye_result::CalibrationResult;
+use handeye_simulate::session::{REALISTIC, camera, trial};
 use serde_json::Value;
 
 use crate::solved::{handeye, text, utf8};

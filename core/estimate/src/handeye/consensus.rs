@@ -128,10 +128,10 @@ mod tests {
 
     use super::*;
     use crate::handeye::Mode;
-    use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
     use handeye_geometry::se3;
+    use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
-    fn pairs(t: &Trial) -> Vec<PosePair> {
+    fn pairs(t: &Session) -> Vec<PosePair> {
         let pair = |view: &handeye_geometry::targets::observation::View| {
             let anchor_from_mount = t.mode.anchor_from_mount(&view.base_from_tip);
             let camera_from_target = t.mount_from_camera.inverse() * anchor_from_mount.inverse() * t.anchor_from_target;

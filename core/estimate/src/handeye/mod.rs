@@ -23,33 +23,10 @@ pub(crate) mod scale;
 pub mod screening;
 pub mod subset;
 
-use serde::{Deserialize, Serialize};
-
 use handeye_geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+pub use handeye_geometry::observations::Mode;
 use handeye_wording::Text;
 use handeye_wording::text;
-
-/// Where the camera sits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Mode {
-    /// The camera is on the tip, the target stands still.
-    EyeInHand,
-    /// The camera stands still, the target is on the tip.
-    EyeToHand,
-}
-
-impl Mode {
-    /// The robot pose of a view in the frames of the common problem.
-    pub fn anchor_from_mount(self, base_from_tip: &Pose<Base, Tip>) -> Pose<Anchor, Mount> {
-        match self {
-            // Anchor is the base and mount the tip.
-            Self::EyeInHand => base_from_tip.relabel(),
-            // Anchor is the tip and mount the base.
-            Self::EyeToHand => base_from_tip.inverse().relabel(),
-        }
-    }
-}
 
 /// The two rigid links that a hand-eye calibration finds.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -116,8 +116,8 @@ mod tests {
     use super::*;
     use crate::handeye::Mode;
     use crate::handeye::closed_form::{ClosedForm as _, ParkMartin};
-    use crate::testing::sessions::{REALISTIC, camera, trial};
     use handeye_geometry::targets::Grid;
+    use handeye_simulate::session::{REALISTIC, camera, trial};
 
     #[test]
     fn views_of_a_square_of_dots_are_counted_alike_however_they_were_detected() {

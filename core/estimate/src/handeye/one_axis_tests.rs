@@ -4,11 +4,12 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::testing::sessions::{BOARD, noise_twist};
 use crate::{CalibrateError, CameraKnowledge, Method, Observations, ObservedView, fit};
 use handeye_geometry::frames::{Anchor, Target};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::noise_twist;
 
 const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
 const POSITION_M: f64 = 5e-4;

@@ -1,8 +1,8 @@
 use super::*;
-use crate::testing::BoardViews;
 use handeye_geometry::planar_pose::PoseError;
 use handeye_geometry::targets::Grid;
 use handeye_geometry::targets::observation::Corner;
+use handeye_simulate::BoardViews;
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };
 const TARGET: TargetSpec = TargetSpec::Chessboard(GRID);

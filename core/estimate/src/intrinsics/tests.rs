@@ -1,13 +1,13 @@
 use nalgebra::{Isometry3, Matrix2, Vector2, Vector3};
 
 use super::*;
-use crate::testing::BoardViews;
 use handeye_geometry::planar_pose::PoseError;
 use handeye_geometry::planar_pose::mirror::mirrored;
 use handeye_geometry::planar_pose::refine::refine;
 use handeye_geometry::targets::Grid;
 use handeye_geometry::targets::observation::Corner;
 use handeye_geometry::view_equations::Whitener;
+use handeye_simulate::BoardViews;
 
 const SIZE: (u32, u32) = (640, 480);
 const BROWN: Distortion = Distortion::BrownConrady([-0.21, 0.12, 0.001, -0.002, -0.02]);

@@ -4,10 +4,10 @@ use crate::diagnose::findings::{FindingCode, FindingOptions, Severity};
 use crate::diagnose::{Calibration, examine};
 use crate::handeye::Mode;
 use crate::handeye::joint::Noise;
-use crate::testing::sessions::{REALISTIC, add_waves, camera, trial};
 use crate::{Method, fit};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, camera, trial};
 
 fn session(mode: Mode, views: usize, noise: &Noise, camera: Intrinsics, seed: u64) -> Observations {
     trial(mode, views, noise, camera, seed).observations(true)
@@ -164,7 +164,7 @@ fn what_the_lens_of_all_sessions_does_beyond_its_model_is_found_together_and_no_
     let trials: Vec<_> = (0..3)
         .map(|k| {
             let mut trial = trial(Mode::EyeInHand, 40, &REALISTIC, camera(), 900 + k);
-            add_waves(&mut trial.views, 0.1, 300.0);
+            trial.add_waves(0.1, 300.0);
             trial
         })
         .collect();

@@ -3,9 +3,10 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::testing::sessions::{BOARD, normal};
 use handeye_geometry::se3;
 use handeye_geometry::targets::observation::Corner;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::normal;
 use handeye_simulate::moving_board::{Stage, centre, lens};
 
 /// Boards 0.3 to 0.6 m away, tilted by up to 40°, known to 0.05 mm and 0.02°, with depths that scatter by 0.3 mm and of which

@@ -10,12 +10,14 @@ use crate::diagnose::findings::FindingOptions;
 use crate::diagnose::{Calibration, calibrate_with};
 use crate::handeye::joint::{Noise, SmallSample};
 use crate::handeye::{HandEye, Mode};
-use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, noise_twist, seen, trial};
 use crate::{CameraKnowledge, Method, Observations, ObservedView, Options};
 use handeye_arm::{ArmKind, ArmModel};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::bent::BoardShape;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::noise_twist;
+use handeye_simulate::session::{REALISTIC, Session, camera, seen, trial};
 
 /// A print that is so much larger than stated, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
@@ -35,7 +37,7 @@ fn solved(observations: &Observations, options: Options) -> Calibration {
 }
 
 /// The corners of a trial as if its board had been printed larger, with the noise that they had.
-fn printed_larger(t: &mut Trial) {
+fn printed_larger(t: &mut Session) {
     for (view, pose) in t.views.iter_mut().zip(&t.true_camera_from_target) {
         for corner in &mut view.corners {
             let at = |scale: f64| {

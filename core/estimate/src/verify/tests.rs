@@ -6,12 +6,14 @@ use crate::Method;
 use crate::diagnose::calibrate;
 use crate::handeye::joint::Noise;
 use crate::handeye::{HandEye, Mode};
-use crate::testing::sessions::{BOARD, REALISTIC, Trial, camera, normal, trial};
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::progress::CancelToken;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::normal;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// A calibration from the first views of a trial; the others are there to check it.
-fn calibrated(t: &Trial, views: usize, free_intrinsics: bool) -> Predictor {
+fn calibrated(t: &Session, views: usize, free_intrinsics: bool) -> Predictor {
     let mut observations = t.observations(free_intrinsics);
     observations.views.truncate(views);
     let calibration = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("solves");
@@ -27,7 +29,7 @@ fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
 }
 
 /// The calibration that is exactly true.
-fn truth(t: &Trial) -> Predictor {
+fn truth(t: &Session) -> Predictor {
     Predictor::known(HandEye::new(t.mode, t.mount_from_camera, t.anchor_from_target), t.intrinsics)
 }
 
@@ -217,12 +219,12 @@ fn what_cannot_be_verified_is_a_typed_error() {
     let turned = t.mount_from_camera.perturbed(&Vector6::new(0.0, 0.0, 0.0, 0.0, std::f64::consts::PI, 0.0));
     behind.hand_eye = HandEye::new(Mode::EyeInHand, turned, t.anchor_from_target);
     let result = verify(&behind, &BOARD, &captures(&t.views), &CancelToken::default());
-    assert!(matches!(result, Err(VerifyError::PredictedBehind { ref name }) if name == "0"), "{result:?}");
+    assert!(matches!(result, Err(VerifyError::PredictedBehind { ref name }) if name == "000"), "{result:?}");
 
     let mut views = t.views.clone();
     views[1].corners.retain(|corner| corner.index < 3);
     let result = verify(&truth, &BOARD, &captures(&views), &CancelToken::default());
-    assert!(matches!(result, Err(VerifyError::NoPose { ref name, .. }) if name == "1"), "{result:?}");
+    assert!(matches!(result, Err(VerifyError::NoPose { ref name, .. }) if name == "001"), "{result:?}");
 
     let pose = &t.views[0].base_from_tip;
     let px = Vector2::new(10.0, 10.0);

@@ -7,7 +7,9 @@ use crate::{ArmBody, Carried, Surroundings};
 use handeye_arm::ArmKind;
 use handeye_estimate::claim::Alternative;
 use handeye_estimate::handeye::{HandEye, Mode};
-use handeye_estimate::testing::sessions::{BOARD, REALISTIC, camera};
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::Links;
+use handeye_simulate::session::{REALISTIC, camera};
 
 fn options(goal_m: f64) -> GuidedOptions {
     GuidedOptions { goal_m, candidates: 300, ..GuidedOptions::default() }
@@ -98,8 +100,11 @@ fn camera_at_the_base(seed: u64) -> Option<GuidedCell> {
         arm,
         joints,
         around: Surroundings::default(),
-        mount_from_camera: Pose::from_isometry(base_from_camera),
-        anchor_from_target: Pose::from_isometry(on_tip),
+        links: Links {
+            mode: Mode::EyeToHand,
+            mount_from_camera: Pose::from_isometry(base_from_camera),
+            anchor_from_target: Pose::from_isometry(on_tip),
+        },
         intrinsics: camera(),
     };
     GuidedCell::placed(CellSetup::new(CellArm::Ur5e, Mode::EyeToHand, seed), places)
@@ -112,10 +117,10 @@ fn is_hidden(cell: &GuidedCell, joints: &[f64]) -> bool {
     let at: Vec<Isometry3<f64>> = crate::links::arm_from_links(&frames).collect();
     let links = crate::links::capsules(chain);
     let last = links.iter().map(|link| link.link).max();
-    let eye = Point3::from(cell.mount_from_camera.translation());
+    let eye = Point3::from(cell.links.mount_from_camera.translation());
     let tip = cell.robot.arm.tip(joints).expect("its joints");
     BOARD.points().iter().any(|point| {
-        let corner = tip.isometry() * cell.anchor_from_target.isometry() * point;
+        let corner = tip.isometry() * cell.links.anchor_from_target.isometry() * point;
         (5..95).any(|percent| {
             let here = eye + (corner - eye) * (f64::from(percent) / 100.0);
             links.iter().filter(|link| Some(link.link) != last).any(|link| {
@@ -280,7 +285,7 @@ fn places_on_the_way(cell: &GuidedCell, from: &JointValues, to: &JointValues) ->
             let part = f64::from(step) / 200.0;
             let joints = JointValues::from_fn(from.len(), |k| from[k] + part * (to[k] - from[k]));
             let tip = *cell.robot.arm.tip(&joints).expect("its own joints").isometry();
-            [tip, tip * cell.mount_from_camera.isometry()]
+            [tip, tip * cell.links.mount_from_camera.isometry()]
         })
         .collect()
 }

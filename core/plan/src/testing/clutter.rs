@@ -13,7 +13,7 @@ use crate::links::{self, LinkCapsule};
 use crate::{Obstacle, SpeedLimits, travel};
 use handeye_arm::JointValues;
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::testing::sessions::BOARD;
+use handeye_geometry::testing::BOARD;
 
 /// Boxes of a scene.
 const BOXES: usize = 10;
@@ -191,12 +191,12 @@ fn beside(cell: &GuidedCell, mode: Mode) -> Obstacle {
     match mode {
         Mode::EyeInHand => {
             let [x, y] = sheet_m();
-            let centre = cell.anchor_from_target.isometry() * Isometry3::from(BOARD.centre().coords);
+            let centre = cell.links.anchor_from_target.isometry() * Isometry3::from(BOARD.centre().coords);
             Obstacle::new("board", centre, [x, y, 0.002])
         }
         Mode::EyeToHand => {
             let behind = Isometry3::translation(0.0, 0.0, -0.5 * CAMERA_BESIDE_M + 0.02);
-            Obstacle::new("camera", cell.mount_from_camera.isometry() * behind, [CAMERA_BESIDE_M; 3])
+            Obstacle::new("camera", cell.links.mount_from_camera.isometry() * behind, [CAMERA_BESIDE_M; 3])
         }
     }
 }
@@ -235,7 +235,7 @@ impl Body {
             Mode::EyeInHand => {
                 let (radius_m, length_m) = HOUSING_M;
                 let housing = surface(&Point3::origin(), &Point3::new(0.0, 0.0, -length_m), radius_m);
-                housing.into_iter().map(|point| cell.mount_from_camera.isometry() * point).collect()
+                housing.into_iter().map(|point| cell.links.mount_from_camera.isometry() * point).collect()
             }
             Mode::EyeToHand => {
                 let [x, y] = sheet_m();
@@ -243,7 +243,7 @@ impl Body {
                 let along = |k: usize, edge_m: f64| (k as f64 / (SHEET_POINTS - 1) as f64 - 0.5) * edge_m;
                 let all = (0..SHEET_POINTS).flat_map(|i| (0..SHEET_POINTS).map(move |j| (i, j)));
                 all.map(|(i, j)| Point3::new(centre.x + along(i, x), centre.y + along(j, y), 0.0))
-                    .map(|point| cell.anchor_from_target.isometry() * point)
+                    .map(|point| cell.links.anchor_from_target.isometry() * point)
                     .collect()
             }
         };

@@ -1,6 +1,6 @@
 //! A cell that takes the poses that guided capture proposes: an arm, a camera and a board whose places are known.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point3, SMatrix, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -10,15 +10,15 @@ use crate::{self as plan, ArmBody, Carried, Obstacle, Pace, Surroundings};
 use handeye_arm::testing as arms;
 use handeye_arm::{Arm, ArmKind, JointValues};
 use handeye_estimate::diagnose::{Calibration, calibrate};
-use handeye_estimate::handeye::joint::correction_transform;
-use handeye_estimate::handeye::joint::{Noise, RobotField, ViewModel};
+use handeye_estimate::handeye::joint::{Noise, ViewModel};
 use handeye_estimate::handeye::{HandEye, Mode};
-use handeye_estimate::testing::sessions::{BOARD, REALISTIC, camera, noise_twist, reported, seen};
 use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
-use handeye_geometry::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use handeye_geometry::frames::{Base, Mount, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
-use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::{Field, Links, noise_twist, robot_error};
+use handeye_simulate::session::{REALISTIC, bent, camera, seen};
 
 /// Arms of the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,10 +105,8 @@ pub struct Places {
     pub joints: JointValues,
     /// What stands around, besides camera and board.
     pub around: Surroundings,
-    /// The camera on its mount.
-    pub mount_from_camera: Pose<Mount, Camera>,
-    /// The board.
-    pub anchor_from_target: Pose<Anchor, Target>,
+    /// Camera and board.
+    pub links: Links,
     /// The lens.
     pub intrinsics: Intrinsics,
 }
@@ -116,8 +114,6 @@ pub struct Places {
 /// From the first pose to where errors of the robot that depend on the place have the size of the noise, metres: about
 /// the RMS spread of the tip in a guided session.
 const FIELD_SPREAD_M: f64 = 0.15;
-/// No pose is farther from the first one than this, metres.
-const FIELD_REACH_M: f64 = 2.0;
 
 /// The cell.
 #[derive(Debug, Clone)]
@@ -125,10 +121,8 @@ pub struct GuidedCell {
     setup: CellSetup,
     rng: ChaCha8Rng,
     intrinsics: Intrinsics,
-    /// The true camera on its mount.
-    pub mount_from_camera: Pose<Mount, Camera>,
-    /// The true place of the board.
-    pub anchor_from_target: Pose<Anchor, Target>,
+    /// The true places of camera and board.
+    pub links: Links,
     /// The arm where it stands now.
     pub robot: Robot,
     /// What was seen so far.
@@ -136,7 +130,7 @@ pub struct GuidedCell {
     /// The board as it is.
     points: Vec<Point3<f64>>,
     /// Errors of the robot that depend on where it stands.
-    field: Option<RobotField>,
+    field: Option<Field>,
 }
 
 /// What came of a guided session.
@@ -174,10 +168,12 @@ impl GuidedCell {
         let mut cell = (0..1000).find_map(|_| cell(drawn(setup, &mut rng)?)).expect("most places are good");
         let Noise { field_m, field_rad, .. } = setup.noise;
         if field_m > 0.0 || field_rad > 0.0 {
-            let mut slopes = |size: f64| Matrix3::from_fn(|_, _| noise_twist(&mut rng, size, 0.0).x / FIELD_SPREAD_M);
-            let (position, orientation) = (slopes(field_m), slopes(field_rad));
-            let origin_m = cell.base_from_tip().translation();
-            cell.field = Some(RobotField::new(origin_m, FIELD_REACH_M, &position, &orientation));
+            let mut part =
+                |size: f64| SMatrix::<f64, 3, 3>::from_fn(|_, _| noise_twist(&mut rng, size, 0.0).x / FIELD_SPREAD_M);
+            let mut slopes = SMatrix::<f64, 6, 3>::zeros();
+            slopes.fixed_rows_mut::<3>(0).copy_from(&part(field_m));
+            slopes.fixed_rows_mut::<3>(3).copy_from(&part(field_rad));
+            cell.field = Some(Field { origin_m: cell.base_from_tip().translation(), slopes });
         }
         cell
     }
@@ -191,7 +187,8 @@ impl GuidedCell {
 
     /// `None` where the arm touches something at the first view.
     fn within_reach(setup: CellSetup, places: Places) -> Option<Self> {
-        let Places { mut arm, joints, around, mount_from_camera, anchor_from_target, intrinsics: lens } = places;
+        let Places { mut arm, joints, around, links, intrinsics: lens } = places;
+        let (mount_from_camera, anchor_from_target) = (&links.mount_from_camera, &links.anchor_from_target);
         let (carried, beside) = match setup.mode {
             Mode::EyeInHand => {
                 let board = plan::sheet(&BOARD, &Pose::from_isometry(*anchor_from_target.isometry()), 0.0);
@@ -215,15 +212,13 @@ impl GuidedCell {
         };
         let focal = setup.untold.focal;
         let said = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
-        let shape = BoardShape { warp_m: setup.untold.bend_m, ..BoardShape::FLAT };
         let (intrinsics, knowledge) =
             if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(said)) };
         Some(Self {
             setup,
             rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),
             intrinsics,
-            mount_from_camera,
-            anchor_from_target,
+            links,
             robot: Robot { arm, around, clearance_m: CLEARANCE_M, joints, pace: PACE, sight: None },
             observations: Observations {
                 mode: Some(setup.mode),
@@ -232,7 +227,7 @@ impl GuidedCell {
                 camera: knowledge,
                 views: Vec::new(),
             },
-            points: BoardPoints::new(&BOARD.points()).points(&shape),
+            points: bent(&BOARD.points(), setup.untold.bend_m, 1.0),
             field: None,
         })
     }
@@ -243,6 +238,11 @@ impl GuidedCell {
     /// Never: the joints are those of the arm.
     pub fn base_from_tip(&self) -> Pose<Base, Tip> {
         self.robot.arm.tip(&self.robot.joints).expect("its own joints")
+    }
+
+    /// The true lens.
+    pub fn camera(&self) -> &Intrinsics {
+        &self.intrinsics
     }
 
     /// Drives the arm there and captures; whether the whole board was in the image.
@@ -260,19 +260,10 @@ impl GuidedCell {
 
     /// What would be captured at a tip pose that the robot reports.
     fn view(&mut self, base_from_tip: &Pose<Base, Tip>) -> Option<ObservedView> {
-        // The error goes the other way round: where the tip truly is, of where it is said to be.
-        let error = reported(&mut self.rng, &Pose::identity(), &self.setup.noise).inverse();
-        let by_place = self
-            .field
-            .as_ref()
-            .map_or_else(Isometry3::identity, |field| correction_transform(&field.correction(base_from_tip)));
-        let true_tip = Pose::from_isometry(base_from_tip.isometry() * by_place * error.isometry());
-        let camera_from_target = handeye_estimate::handeye::joint::camera_from_target(
-            self.setup.mode,
-            &true_tip,
-            &self.mount_from_camera,
-            &self.anchor_from_target,
-        );
+        let error = robot_error(&mut self.rng, &self.setup.noise);
+        let by_place = self.field.map_or_else(Isometry3::identity, |field| field.error(base_from_tip));
+        let true_tip = Pose::from_isometry(base_from_tip.isometry() * by_place * error);
+        let camera_from_target = self.links.camera_from_target(&true_tip);
         let no_more = |_| Vector2::zeros();
         let corners = seen(
             &mut self.rng,
@@ -291,7 +282,7 @@ impl GuidedCell {
     pub fn true_error_m(&self, calibration: &Calibration) -> Option<f64> {
         let estimated = calibration.hand_eye?.mount_from_camera();
         let point = calibration.joint.as_ref()?.reference_point;
-        let off = (self.mount_from_tip() * self.mount_from_camera).inverse() * estimated;
+        let off = (self.mount_from_tip() * self.links.mount_from_camera).inverse() * estimated;
         Some((off.isometry() * point - point).norm())
     }
 
@@ -303,15 +294,15 @@ impl GuidedCell {
         let middle = tips.map(|tip| tip.translation()).sum::<Vector3<f64>>() / count;
         let at_middle = Pose::from_isometry(Translation3::from(middle).into());
         match (&self.field, self.setup.mode) {
-            (Some(field), Mode::EyeInHand) => Pose::from_isometry(correction_transform(&field.correction(&at_middle))),
+            (Some(field), Mode::EyeInHand) => Pose::from_isometry(field.error(&at_middle)),
             _ => Pose::identity(),
         }
     }
 
     /// The model of what is true.
     pub fn truth(&self) -> ViewModel {
-        let Self { setup, intrinsics, mount_from_camera, anchor_from_target, .. } = self;
-        let hand_eye = HandEye::new(setup.mode, *mount_from_camera, *anchor_from_target);
+        let Self { setup, intrinsics, links, .. } = self;
+        let hand_eye = HandEye::new(setup.mode, links.mount_from_camera, links.anchor_from_target);
         ViewModel::known(hand_eye, *intrinsics, setup.free_lens, setup.noise, &BOARD)
     }
 
@@ -421,8 +412,11 @@ fn drawn(setup: CellSetup, rng: &mut ChaCha8Rng) -> Option<Places> {
         arm,
         joints,
         around: Surroundings::of(vec![table]),
-        mount_from_camera: Pose::from_isometry(mount_from_camera),
-        anchor_from_target: Pose::from_isometry(anchor_from_target),
+        links: Links {
+            mode: setup.mode,
+            mount_from_camera: Pose::from_isometry(mount_from_camera),
+            anchor_from_target: Pose::from_isometry(anchor_from_target),
+        },
         intrinsics: lens,
     })
 }

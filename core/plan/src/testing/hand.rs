@@ -8,11 +8,13 @@ use super::guided_cell::GuidedCell;
 use crate::guided::by_hand::{HandGuide, HandNext, Wanted};
 use crate::guided::{Ending, GuidedOptions};
 use handeye_estimate::diagnose::Calibration;
-use handeye_estimate::handeye::joint::ViewModel;
-use handeye_estimate::testing::sessions::{BOARD, seen};
+use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::Corner;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::links::Links;
+use handeye_simulate::session::seen;
 
 /// Time between two looks at the image, seconds.
 const LOOK_S: f64 = 0.1;
@@ -48,28 +50,28 @@ pub struct HandRun {
 /// When the board is not in view there.
 pub fn session(cell: &mut GuidedCell, options: GuidedOptions, views: usize, seed: u64) -> HandRun {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let truth = cell.truth();
+    let (links, camera) = (cell.links, *cell.camera());
     let mut guide = HandGuide::new(options);
     let at = cell.base_from_tip();
     assert!(cell.capture_at(&at), "the board is in view at the beginning");
-    let first = truth.camera_from_target(&at);
+    let first = links.camera_from_target(&at);
     let mut present = first;
     let mut run = HandRun { ending: None, calibration: None, took_s: Vec::new(), refused: 0, skipped: 0 };
     while cell.observations.views.len() < views {
         let known = cell.known(run.calibration.as_ref(), 0.0);
-        let wanted = match guide.next(&known, &first, truth.intrinsics(), &CancelToken::default()) {
+        let wanted = match guide.next(&known, &first, &camera, &CancelToken::default()) {
             HandNext::Take(wanted) => wanted,
             HandNext::End(ending) => {
                 run.ending = Some(ending);
                 break;
             }
         };
-        let (reached, took_s) = bring_about(&wanted, &present, &truth, &mut rng);
+        let (reached, took_s) = bring_about(&wanted, &present, (&links, &camera), &mut rng);
         present = reached;
         if took_s >= PATIENCE_S {
             run.skipped += 1;
             guide.skipped();
-        } else if cell.capture_at(&truth.base_from_tip(&present)) {
+        } else if cell.capture_at(&links.base_from_tip(&present)) {
             run.took_s.push(took_s);
             guide.captured();
             run.calibration = cell.calibrate();
@@ -81,19 +83,16 @@ pub fn session(cell: &mut GuidedCell, options: GuidedOptions, views: usize, seed
 }
 
 /// What is found in a view; `None` where the board is not whole.
-///
-/// # Panics
-/// Never: there is no noise to draw.
-pub fn corners(truth: &ViewModel, camera_from_target: &Pose<Camera, Target>) -> Option<Vec<Corner>> {
+pub fn corners(camera: &Intrinsics, camera_from_target: &Pose<Camera, Target>) -> Option<Vec<Corner>> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    seen(&mut rng, truth.intrinsics(), camera_from_target.isometry(), &BOARD.points(), 0.0, |_| Vector2::zeros())
+    seen(&mut rng, camera, camera_from_target.isometry(), &BOARD.points(), 0.0, |_| Vector2::zeros())
 }
 
 /// Where the hand gets to, and how long it takes.
 fn bring_about(
     wanted: &Wanted,
     from: &Pose<Camera, Target>,
-    truth: &ViewModel,
+    (links, camera): (&Links, &Intrinsics),
     rng: &mut ChaCha8Rng,
 ) -> (Pose<Camera, Target>, f64) {
     let mut about = |scale: f64| (rng.random::<f64>() * 2.0 - 1.0) * scale;
@@ -113,8 +112,8 @@ fn bring_about(
             UnitQuaternion::from_scaled_axis(limited(turn, STEP.1) + vector(TREMOR.1)) * present.rotation,
         );
         let there = Pose::from_isometry(present);
-        let corners = corners(truth, &there);
-        if corners.is_some_and(|corners| wanted.judge(&corners, &truth.base_from_tip(&there)).is_good) {
+        let corners = corners(camera, &there);
+        if corners.is_some_and(|corners| wanted.judge(&corners, &links.base_from_tip(&there)).is_good) {
             good += 1;
             if good >= GOOD_LOOKS {
                 return (there, time_s);

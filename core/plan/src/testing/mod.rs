@@ -1,4 +1,4 @@
-//! Simulated cells in which guided capture runs, for tests and studies. Feature `testing`.
+//! Guided sessions in simulated cells (`handeye_simulate`), for tests and studies. Feature `testing`.
 
 pub mod clutter;
 pub mod guided_cell;

@@ -3,13 +3,13 @@
 
 use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity, findings};
 use handeye_estimate::diagnose::{Calibration, calibrate};
-use handeye_estimate::testing::{BoardViews, SharedErrors};
 use handeye_estimate::{CameraKnowledge, Method, Observations, Options, ViewStatus, fit_with};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::Grid;
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_result::CalibrationResult;
+use handeye_simulate::{BoardViews, SharedErrors};
 use nalgebra::{Matrix2, Vector2};
 
 const GRID: Grid = Grid { columns: 10, rows: 7, square_m: 0.03 };

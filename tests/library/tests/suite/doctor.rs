@@ -11,15 +11,16 @@ use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions,
 use handeye_estimate::diagnose::{Calibration, calibrate, calibrate_with, examine};
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::closed_form;
-use handeye_estimate::testing::faulty::{self, ArmError, Fault, Setup, session};
-use handeye_estimate::testing::sessions::{GRID, camera};
 use handeye_estimate::{Fit, Method, Observations, Options, TargetSize, ViewStatus, fit};
 use handeye_geometry::frames::Pose;
+use handeye_geometry::observations::Noise;
 use handeye_geometry::planar_pose;
 use handeye_geometry::progress::CancelToken;
+use handeye_geometry::testing::GRID;
 use handeye_plan::guided::GuidedOptions;
 use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
 use handeye_result::CalibrationResult;
+use handeye_simulate::session::{ArmError, Cone, Fault, Setup, camera, links, observed};
 use handeye_wording::Catalogue;
 
 use handeye_geometry::targets::TargetSpec;
@@ -63,8 +64,8 @@ fn healthy_sessions_raise_no_alarm() {
 /// A session of a simulator: an exact robot, whose poses are written to a micrometre, and corners as a renderer draws them, to
 /// thousandths of a pixel; one image is a little worse, and one corner in it.
 fn simulated(mode: Mode, estimated: bool, seed: u64) -> Observations {
-    let exact = Setup { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, estimated, ..Setup::new(mode, 12, seed) };
-    let mut session = session(&exact);
+    let exact = Setup { noise: Noise::EXACT, estimated, ..Setup::new(mode, 12, seed) };
+    let mut session = observed(&exact);
     for (i, view) in session.views.iter_mut().enumerate() {
         let px = if i == 2 { 0.006 } else { 0.0012 };
         for (k, corner) in view.corners.iter_mut().flatten().enumerate() {
@@ -127,7 +128,7 @@ fn an_arm_whose_error_depends_on_where_it_stands_raises_no_alarm() {
         let (observations, setup) = faults::as_met(seed);
         let findings = faults::examined(&observations).findings;
         let named: Vec<_> = findings.iter().filter(|finding| faults::names_a_cause(finding, &setup)).collect();
-        assert!(named.is_empty(), "{setup}: {named:?}");
+        assert!(named.is_empty(), "{setup:?}: {named:?}");
     }
 }
 
@@ -138,7 +139,7 @@ fn links_of_an_arm_that_are_too_long_are_no_other_size_of_the_target() {
     for seed in [30_184, 30_287, 30_424] {
         let (observations, setup) = faults::as_met(20_000 + seed);
         let findings = faults::examined_alone(&observations).findings;
-        assert!(findings.iter().all(|finding| finding.code != FindingCode::WrongScale), "{setup}: {findings:?}");
+        assert!(findings.iter().all(|finding| finding.code != FindingCode::WrongScale), "{setup:?}: {findings:?}");
     }
 }
 
@@ -180,11 +181,11 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
     for seed in 0..6 {
         let mode = if seed % 2 == 0 { Mode::EyeInHand } else { Mode::EyeToHand };
         let estimated = seed > 2;
-        let fine =
-            Setup { corner_px: 0.03, robot_m: 2e-5, robot_rad: 5e-5, estimated, ..Setup::new(mode, 20, 900 + seed) };
+        let noise = Noise { corner_px: 0.03, robot_m: 2e-5, robot_rad: 5e-5, ..Noise::EXACT };
+        let fine = Setup { noise, estimated, ..Setup::new(mode, 20, 900 + seed) };
         for (warp_m, scale) in [(3e-3, 0.0), (0.0, 0.03)] {
             let (calibration, diagnosis) =
-                examined(&session(&fine.clone().with(Fault { warp_m, scale, ..Fault::default() })));
+                examined(&observed(&fine.clone().with(Fault { warp_m, scale, ..Fault::default() })));
             let size = calibration.joint.as_ref().and_then(|joint| joint.size.clone()).expect("the robot moved");
             let said = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale);
             if let Some(estimate) = said.and_then(|h| h.estimate) {
@@ -212,7 +213,7 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
     // Two centimetres and a degree a metre, one way or the other.
     let per_metre = SMatrix::from_fn(|i, j| if (i + 2 * j) % 3 == 0 { 0.02 } else { -0.014 });
     let setup = Setup { arm_error: ArmError::Affine(per_metre), ..Setup::new(Mode::EyeInHand, 20, 950) };
-    let observations = session(&setup);
+    let observations = observed(&setup);
     let cancel = CancelToken::default();
     let calibrated = fit(&observations, Method::Joint, &cancel).expect("solves");
     let joint = calibrated.joint.as_ref().expect("a joint estimate");
@@ -254,7 +255,7 @@ fn the_error_beside_a_lens_that_was_given_wrongly_is_that_of_the_answer() {
 /// The same with target poses in the place of corners.
 fn scale_error_of_poses(seed: u64) -> Option<f64> {
     let setup = Setup::new(Mode::EyeInHand, 20, seed);
-    let mut observations = session(&setup.with(Fault { scale: 0.02, ..Fault::default() }));
+    let mut observations = observed(&setup.with(Fault { scale: 0.02, ..Fault::default() }));
     let target = observations.target;
     for view in &mut observations.views {
         let corners = view.corners.take()?;
@@ -268,7 +269,7 @@ fn scale_error_of_poses(seed: u64) -> Option<f64> {
 #[test]
 fn a_view_out_of_the_fit_touches_nothing() {
     let fault = Fault { moving: vec![(5, [0.02, 0.0, 0.0, 0.0, 0.05, 0.0].into())], ..Fault::default() };
-    let mut with = session(&Setup::new(Mode::EyeInHand, 14, 801).with(fault));
+    let mut with = observed(&Setup::new(Mode::EyeInHand, 14, 801).with(fault));
     let found = faults::examined_alone(&with);
     assert_eq!(found.hypotheses[0].views, ["005"], "{:?}", found.hypotheses[0]);
     with.views[5].in_fit = false;
@@ -281,7 +282,7 @@ fn a_view_out_of_the_fit_touches_nothing() {
 
 #[test]
 fn what_was_not_tested_is_said_and_never_called_healthy() {
-    let observations = session(&Setup::new(Mode::EyeInHand, 14, 802));
+    let observations = observed(&Setup::new(Mode::EyeInHand, 14, 802));
     let cancel = CancelToken::default();
     cancel.cancel();
     let cancelled = diagnose(&observations, &FindingOptions::default(), &cancel);
@@ -298,8 +299,9 @@ fn what_was_not_tested_is_said_and_never_called_healthy() {
 #[test]
 fn the_weakest_direction_is_named_where_tilts_are_small() {
     // Turns about the line of sight alone leave the place along it open; a few degrees of tilt leave it weak.
-    let setup = Setup { tilt_deg: 3.0, roll_deg: 60.0, ..Setup::new(Mode::EyeInHand, 20, 803) };
-    let findings = faults::examined(&session(&setup)).findings;
+    let cone = Cone { tilt_deg: 3.0, ..Cone::PUBLISHED };
+    let setup = Setup { cone, ..Setup::new(Mode::EyeInHand, 20, 803) };
+    let findings = faults::examined(&observed(&setup)).findings;
     let weak = findings.iter().find(|f| f.code == FindingCode::WeakDirection).unwrap_or_else(|| panic!("{findings:?}"));
     assert!(weak.value("camera_axis_z").is_some_and(|z| z > 0.95), "{weak}");
     assert!(weak.to_string().contains("about the camera's x and y axes"), "{weak}");
@@ -326,8 +328,8 @@ fn the_stated_error_covers_the_true_one_when_what_was_given_is_wrong() {
         for seed in 0..4 {
             let mode = if seed % 2 == 0 { Mode::EyeInHand } else { Mode::EyeToHand };
             let setup = Setup { joints: true, ..Setup::new(mode, 20, 700 + seed) };
-            let calibration = claimed(&session(&setup.with(fault.clone())));
-            let (true_mount_from_camera, _) = faulty::links(mode);
+            let calibration = claimed(&observed(&setup.with(fault.clone())));
+            let true_mount_from_camera = links(mode).mount_from_camera;
             let found = calibration.hand_eye.expect("a hand-eye").mount_from_camera();
             let point = calibration.joint.as_ref().expect("a joint estimate").reference_point;
             let error_m = (found.isometry() * point - true_mount_from_camera.isometry() * point).norm();
@@ -365,7 +367,7 @@ fn no_error_is_stated_where_the_data_contradict_themselves() {
 #[test]
 fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice() {
     let setup = Setup::new(Mode::EyeInHand, 20, 710).with(Fault { scale: -0.04, ..Fault::default() });
-    let (observations, cancel) = (session(&setup), CancelToken::default());
+    let (observations, cancel) = (observed(&setup), CancelToken::default());
     let fit = fit(&observations, Method::Joint, &cancel).expect("an answer");
     let calibration = examine(&observations, fit.clone(), &FindingOptions::default(), &cancel).expect("not cancelled");
     // The noise alone would reach it.
@@ -387,7 +389,7 @@ fn the_goal_is_judged_by_the_error_that_is_stated_and_more_views_are_no_advice()
 fn a_unit_that_was_stated_wrongly_is_named() {
     use nalgebra::{Isometry3, UnitQuaternion};
     let setup = Setup { estimated: false, ..Setup::new(Mode::EyeInHand, 16, 721) };
-    let healthy = session(&setup);
+    let healthy = observed(&setup);
     let changed = |change: &dyn Fn(Isometry3<f64>) -> Isometry3<f64>| {
         let mut session = healthy.clone();
         for view in &mut session.views {
@@ -433,14 +435,14 @@ fn a_unit_that_was_stated_wrongly_is_named() {
 #[test]
 fn views_numbered_from_the_other_end_mislead_neither_closed_forms_nor_the_doctor() {
     // Circles look the same from both ends.
-    let mut observations = session(&Setup::new(Mode::EyeInHand, 16, 720));
+    let mut observations = observed(&Setup::new(Mode::EyeInHand, 16, 720));
     observations.target = TargetSpec::Circles(GRID);
     for n in [2, 3, 9, 13] {
         let corners = observations.views[n].corners.as_mut().expect("seen");
         handeye_geometry::targets::observation::renumber(corners, &mut None, &TargetSpec::Circles(GRID), 2);
     }
     let cancel = CancelToken::default();
-    let (true_mount_from_camera, _) = faulty::links(Mode::EyeInHand);
+    let true_mount_from_camera = links(Mode::EyeInHand).mount_from_camera;
     for method in [Method::Joint, Method::ClosedForm("park_martin")] {
         let calibration = calibrate(&observations, method, &cancel).expect("an answer");
         let renumbered = calibration.views.iter().filter(|view| view.quarter_turns != 0).count();
@@ -463,14 +465,14 @@ mod slow {
     #[test]
     fn an_arm_of_servo_motors_has_no_target_and_no_camera_that_moved_but_one_that_slipped_by_far() {
         let moves = |setup: &Setup| {
-            let findings = faults::examined_alone(&session(setup)).findings;
+            let findings = faults::examined_alone(&observed(setup)).findings;
             findings.into_iter().filter(faults::names_a_move).collect::<Vec<_>>()
         };
         let mut found = 0;
         for seed in 0..10 {
             let setup = faults::servo(seed);
             let named = moves(&setup);
-            assert!(named.is_empty(), "{seed}, {setup}: {named:?}");
+            assert!(named.is_empty(), "{seed}, {setup:?}: {named:?}");
             let slip = [0.018, -0.024, 0.0, 0.0, 0.0, 0.0].into();
             let fault = Fault { board_moved: Some((setup.views / 2, slip)), ..setup.fault.clone() };
             found += usize::from(!moves(&setup.with(fault)).is_empty());
@@ -499,7 +501,7 @@ mod slow {
 /// As where edges are hard and a board lies along the pixels: all of it is off, which no residual shows.
 #[test]
 fn a_view_whose_corners_are_off_together_as_their_detector_says_contradicts_nothing() {
-    let observations = session(&Setup::new(Mode::EyeInHand, 16, 720));
+    let observations = observed(&Setup::new(Mode::EyeInHand, 16, 720));
     let accused = |stated: bool| {
         let mut observations = observations.clone();
         for (i, view) in observations.views.iter_mut().enumerate() {

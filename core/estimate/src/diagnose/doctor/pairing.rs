@@ -161,13 +161,14 @@ mod tests {
 
     use super::*;
     use crate::handeye::Mode;
-    use crate::testing::faulty::{Setup, links, session};
+    use handeye_simulate::links::Links;
+    use handeye_simulate::session::{Setup, links, observed};
 
     /// A step explains what it repairs, not what the solution beside it happens to suit better.
     #[test]
     fn a_step_is_believed_by_the_views_that_it_pairs_anew() {
-        let healthy = SessionViews::new(&session(&Setup::new(Mode::EyeInHand, 14, 71)), None).expect("views");
-        let (mount_from_camera, anchor_from_target) = links(Mode::EyeInHand);
+        let healthy = SessionViews::new(&observed(&Setup::new(Mode::EyeInHand, 14, 71)), None).expect("views");
+        let Links { mount_from_camera, anchor_from_target, .. } = links(Mode::EyeInHand);
         let right = ClosedFormSolution { mount_from_camera, anchor_from_target };
         let off = Vector6::new(0.02, 0.0, 0.0, 0.0, 0.0, 0.0);
         let poor = ClosedFormSolution { mount_from_camera: mount_from_camera.perturbed(&off), anchor_from_target };
@@ -178,7 +179,7 @@ mod tests {
         assert!(!explains(&healthy, step, Some(&poor), &right, wrong_m), "all it does is give the last views up");
 
         // The last views have poses of two rows further, which the step undoes.
-        let mut shifted = session(&Setup::new(Mode::EyeInHand, 14, 71));
+        let mut shifted = observed(&Setup::new(Mode::EyeInHand, 14, 71));
         let poses: Vec<_> = shifted.views.iter().map(|view| view.base_from_tip).collect();
         for (view, pose) in shifted.views[9..14].iter_mut().zip(&poses[7..12]) {
             view.base_from_tip = *pose;

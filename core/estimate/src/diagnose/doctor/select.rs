@@ -161,14 +161,14 @@ mod tests {
     use crate::diagnose::doctor::{diagnose, gross};
     use crate::diagnose::findings::FindingOptions;
     use crate::handeye::Mode;
-    use crate::testing::faulty::{Setup, session};
     use handeye_geometry::progress::CancelToken;
+    use handeye_simulate::session::{Setup, observed};
 
     /// A real session in which every fourth view is wrong, each in a way of its own and less than grossly.
     #[test]
     fn a_session_with_much_wrong_is_examined_within_bounds_and_the_end_is_said() {
         for (views, joints) in [(40, false), (100, false), (100, true)] {
-            let mut observations = session(&Setup { joints, ..Setup::new(Mode::EyeInHand, views, 5) });
+            let mut observations = observed(&Setup { joints, ..Setup::new(Mode::EyeInHand, views, 5) });
             for (i, view) in observations.views.iter_mut().enumerate().filter(|(i, _)| i % 4 == 1) {
                 let off =
                     Vector6::from_fn(|k, _| (((i * 7 + k * 5) % 11) as f64 - 5.0) * if k < 3 { 1.5e-3 } else { 3e-3 });

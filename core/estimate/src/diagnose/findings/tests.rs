@@ -3,24 +3,24 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::Noise;
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
 use crate::{CameraKnowledge, Method, Options, fit, fit_with};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 use handeye_wording::Text;
 
 fn solve(observations: &Observations) -> Calibration {
     Calibration::as_modelled(fit(observations, Method::Joint, &CancelToken::default()).expect("solves"))
 }
 
-fn of_trial(t: &Trial, free: bool, options: &FindingOptions) -> Vec<Finding> {
+fn of_trial(t: &Session, free: bool, options: &FindingOptions) -> Vec<Finding> {
     let observations = t.observations(free);
     findings(&observations, Some(&solve(&observations)), options)
 }
 
 /// As a user sees it who keeps views that do not fit.
-fn of_all_views(t: &Trial) -> Vec<Finding> {
+fn of_all_views(t: &Session) -> Vec<Finding> {
     let observations = t.observations(false);
     let keep = Options { keep_outliers: true, ..Options::default() };
     let fit = fit_with(&observations, Method::Joint, keep, &CancelToken::default()).expect("solves");
@@ -32,12 +32,12 @@ fn find(found: &[Finding], code: FindingCode) -> Option<&Finding> {
     found.iter().find(|f| f.code == code)
 }
 
-fn set(views: usize, seed: u64) -> Trial {
+fn set(views: usize, seed: u64) -> Session {
     trial(Mode::EyeInHand, views, &REALISTIC, camera(), seed)
 }
 
 /// Robot poses turned about one axis of the tip by up to `about` and about another by up to `across`, in degrees.
-fn turned(mut t: Trial, about: &Vector3<f64>, about_deg: f64, across: &Vector3<f64>, across_deg: f64) -> Trial {
+fn turned(mut t: Session, about: &Vector3<f64>, about_deg: f64, across: &Vector3<f64>, across_deg: f64) -> Session {
     let first = *t.views[0].base_from_tip.isometry();
     let n = t.views.len() as f64;
     for (i, view) in t.views.iter_mut().enumerate() {
@@ -98,7 +98,7 @@ fn too_few_views_are_a_problem_below_three_and_advice_below_ten() {
     assert_eq!(found[0].code, FindingCode::TooFewViews, "problems come first");
     assert_eq!((found[0].severity, found[0].value("needed")), (Severity::Problem, Some(3.0)));
     let missing = find(&found, FindingCode::TargetNotFound).expect("seven");
-    assert_eq!(missing.views, ["0", "1", "2", "3", "4", "5", "6"]);
+    assert_eq!(missing.views, ["000", "001", "002", "003", "004", "005", "006"]);
     assert!(missing.to_string().contains("0, 1, 2, 3 and 3 more"), "{missing}");
 }
 
@@ -169,12 +169,12 @@ fn one_wrong_robot_pose_is_named_by_correction_and_influence() {
     let found = of_all_views(&t);
     for code in [FindingCode::LargeCorrection, FindingCode::InfluentialView] {
         let finding = find(&found, code).unwrap_or_else(|| panic!("{code:?} in {found:?}"));
-        assert_eq!(finding.views, ["7"]);
+        assert_eq!(finding.views, ["007"]);
     }
     assert!(find(&found, FindingCode::LargeResidual).is_none(), "its corners are as good as the others'");
     let found = of_trial(&t, false, &FindingOptions::default());
     let aside = find(&found, FindingCode::OutlierView).expect("outlier");
-    assert_eq!(aside.views, ["7"]);
+    assert_eq!(aside.views, ["007"]);
     // PnP knows the tilt of one view to a tenth of a degree.
     assert!((aside.value("angle").expect("stated") - 0.5).abs() < 0.3, "{aside}");
     assert!(find(&found, FindingCode::LargeCorrection).is_none(), "the answer is without it");
@@ -190,7 +190,7 @@ fn one_blurred_image_is_named_by_its_residual() {
     }
     let found = of_all_views(&t);
     let finding = find(&found, FindingCode::LargeResidual).expect("ten times the noise");
-    assert_eq!(finding.views, ["4"]);
+    assert_eq!(finding.views, ["004"]);
     assert!(finding.value("rms") > finding.value("median_rms").map(|m| 5.0 * m));
 }
 

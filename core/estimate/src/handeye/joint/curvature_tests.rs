@@ -1,9 +1,10 @@
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::{estimate, fit};
-use crate::testing::sessions::{camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{camera, trial};
 
 /// Corners of 0.3 px and a good robot.
 const NOISE: Noise = Noise { corner_px: 0.3, robot_m: 1e-4, robot_rad: 3.5e-4, ..Noise::EXACT };

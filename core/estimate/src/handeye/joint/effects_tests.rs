@@ -3,9 +3,10 @@ use nalgebra::{DMatrix, Matrix2};
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::{CornerWeights, estimate};
-use crate::testing::sessions::{REALISTIC, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::targets::corner_covariance::CornerCovariance;
 use handeye_geometry::targets::observation::{Corners, View};
+use handeye_simulate::session::{REALISTIC, camera, trial};
 
 /// Corners of which one in three is twice as good along a direction, the same in every view.
 fn covariance_px2(corner: usize) -> Matrix2<f64> {

@@ -2,9 +2,10 @@ use nalgebra::{DMatrix, Point3, Vector6};
 
 use crate::handeye::joint::{Noise, ViewModel};
 use crate::handeye::{HandEye, Mode};
-use crate::testing::sessions::{BOARD, REALISTIC, camera, trial};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::session::{REALISTIC, camera, trial};
 
 /// Where a model has a point of the board in a view.
 fn pixel(model: &ViewModel, base_from_tip: &Pose<Base, Tip>, point: &Point3<f64>) -> nalgebra::Vector2<f64> {

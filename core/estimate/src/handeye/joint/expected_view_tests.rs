@@ -2,9 +2,11 @@ use super::*;
 use crate::handeye::joint::normal::System;
 use crate::handeye::joint::state::State;
 use crate::handeye::joint::{JointProblem, estimate};
-use crate::testing::sessions::{BOARD, REALISTIC, add_field, camera, trial};
+use crate::test_sessions::Estimated as _;
 use crate::{Method, fit};
 use handeye_geometry::progress::CancelToken;
+use handeye_geometry::testing::BOARD;
+use handeye_simulate::session::{REALISTIC, add_field, camera, trial};
 
 /// The information of views by the rows is that of the estimator's own equations, view by view.
 #[test]

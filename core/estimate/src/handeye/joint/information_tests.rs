@@ -5,8 +5,9 @@ use crate::handeye::joint::problem::Free;
 use crate::handeye::joint::state::State;
 use crate::handeye::joint::variance::{evaluate, to_logs};
 use crate::handeye::joint::{JointProblem, Noise};
-use crate::testing::sessions::{camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{camera, trial};
 
 /// The count of a level is `θ_k tr(P V_k)`, so its derivative by the log of another variance is minus twice the information.
 #[test]

@@ -1,15 +1,16 @@
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::{Free, JointProblem, estimate, fit};
-use crate::testing::sessions::{Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use crate::uncertainty::quality;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{Session, camera, trial};
 
 /// 0.5 mm and 0.1°, far above what the corners leave open.
 const ROBOT: Noise = Noise { corner_px: 0.03, robot_m: 5e-4, robot_rad: 1.7e-3, ..Noise::EXACT };
 
 /// How far the answer puts its reference point from where it is, metres.
-fn miss(t: &Trial, found: &crate::handeye::joint::JointSolution) -> f64 {
+fn miss(t: &Session, found: &crate::handeye::joint::JointSolution) -> f64 {
     let by_truth = found.hand_eye.mount_from_camera().isometry().inverse() * t.mount_from_camera.isometry();
     (by_truth * found.reference_point - found.reference_point).norm()
 }

@@ -1,10 +1,11 @@
 use super::*;
 use crate::handeye::Mode;
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// The target's own pose in every view: the chain with the error of the robot taken out by a fit of the corners.
-fn own(t: &Trial) -> Vec<Pose<Camera, Target>> {
+fn own(t: &Session) -> Vec<Pose<Camera, Target>> {
     let seen: Vec<Pose<Camera, Target>> = t.true_camera_from_target.clone();
     t.views
         .iter()
@@ -17,7 +18,7 @@ fn own(t: &Trial) -> Vec<Pose<Camera, Target>> {
         .collect()
 }
 
-fn screened(t: &Trial) -> Screened {
+fn screened(t: &Session) -> Screened {
     estimate_screened(&t.problem(false, None), &t.start(), &own(t), &CancelToken::default()).expect("solves")
 }
 
@@ -66,19 +67,19 @@ fn one_grossly_wrong_view_of_ten_does_not_lead_the_fit_astray() {
     for noise in [exact, REALISTIC] {
         for seed in 0..8 {
             let healthy = trial(Mode::EyeInHand, 10, &noise, camera(), 1000 + seed);
-            let robot_off = |t: &mut Trial| {
+            let robot_off = |t: &mut Session| {
                 let off = Vector6::new(0.03, -0.02, 0.03, 0.1, 0.05, -0.1);
                 t.views[6].base_from_tip = t.views[6].base_from_tip.perturbed(&off);
             };
-            let other_end = |t: &mut Trial| {
+            let other_end = |t: &mut Session| {
                 t.views[6].corners.iter_mut().for_each(|c| c.index = 69 - c.index);
-                let centre = nalgebra::Translation3::from(crate::testing::sessions::BOARD.centre().coords);
+                let centre = nalgebra::Translation3::from(handeye_geometry::testing::BOARD.centre().coords);
                 let half_turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::PI);
                 let turn = centre * half_turn * centre.inverse();
                 let truth = &mut t.true_camera_from_target[6];
                 *truth = Pose::from_isometry(truth.isometry() * turn);
             };
-            let spoils: [&dyn Fn(&mut Trial); 2] = [&robot_off, &other_end];
+            let spoils: [&dyn Fn(&mut Session); 2] = [&robot_off, &other_end];
             for (kind, spoil) in spoils.into_iter().enumerate() {
                 let mut t = trial(Mode::EyeInHand, 10, &noise, camera(), 1000 + seed);
                 spoil(&mut t);

@@ -1,11 +1,12 @@
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::{JointSolution, estimate};
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use crate::uncertainty::quality;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
-fn solve(t: &Trial, free_intrinsics: bool) -> JointSolution {
+fn solve(t: &Session, free_intrinsics: bool) -> JointSolution {
     estimate(&t.problem(free_intrinsics, None), &t.start(), &CancelToken::default()).expect("solves")
 }
 

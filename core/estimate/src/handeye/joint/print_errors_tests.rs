@@ -5,7 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::{Noise, with_stated_error};
-use crate::testing::sessions::{BOARD, GRID, REALISTIC, Trial, add_print_errors, camera, normal, trial};
+use crate::test_sessions::Estimated as _;
+use handeye_geometry::testing::{BOARD, GRID};
+use handeye_simulate::links::normal;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// Corners that are good and a robot that is nearly exact: what is left is the print.
 const EXACT_ROBOT: Noise = Noise { corner_px: 0.05, robot_m: 1e-6, robot_rad: 1e-6, ..Noise::EXACT };
@@ -49,14 +52,14 @@ impl Print {
     }
 }
 
-fn session(views: usize, noise: &Noise, print: Print, seed: u64) -> Trial {
+fn session(views: usize, noise: &Noise, print: Print, seed: u64) -> Session {
     let mut session = trial(Mode::EyeInHand, views, noise, camera(), seed);
-    add_print_errors(&mut session, &print.errors_m(seed));
+    session.add_print_errors(&print.errors_m(seed));
     session
 }
 
 /// The answer with print errors where they are shown, and with the error that may be stated.
-fn solved(session: &Trial) -> (Option<PrintErrors>, JointSolution, JointSolution) {
+fn solved(session: &Session) -> (Option<PrintErrors>, JointSolution, JointSolution) {
     let cancel = CancelToken::default();
     let problem = session.problem(true, None);
     let without = fit(&problem, &session.start(), &cancel).expect("solves");
@@ -71,7 +74,7 @@ fn solved(session: &Trial) -> (Option<PrintErrors>, JointSolution, JointSolution
     (Some(print), solution, plain)
 }
 
-fn squared_distance(session: &Trial, solution: &JointSolution) -> f64 {
+fn squared_distance(session: &Session, solution: &JointSolution) -> f64 {
     let error: Vector6<f64> = session.hand_eye_error(solution);
     error.dot(&(solution.hand_eye_covariance().try_inverse().expect("regular") * error))
 }

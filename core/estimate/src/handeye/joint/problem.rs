@@ -9,35 +9,10 @@ use crate::handeye::joint::state::State;
 use crate::handeye::joint::weights::CornerWeights;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
+pub use handeye_geometry::observations::Noise;
 use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
 use handeye_geometry::targets::observation::View;
 use handeye_geometry::view_equations::{FreeParameters, MeasuredDepths, ViewInput, Whitener};
-
-/// Noise levels, one standard deviation per axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Of a corner, pixels.
-    pub corner_px: f64,
-    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
-    /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
-    /// none.
-    pub view_px: f64,
-    /// Of the reported tip position, metres.
-    pub robot_m: f64,
-    /// Of the reported tip orientation, radians.
-    pub robot_rad: f64,
-    /// Of errors of the reported tip position that depend on where it is, see [`RobotField`], metres: at a distance of the
-    /// RMS spread of the places from their mean. Zero where they are not in the model.
-    pub field_m: f64,
-    /// Of the reported tip orientation likewise, radians.
-    pub field_rad: f64,
-}
-
-impl Noise {
-    /// None at all.
-    pub const EXACT: Self =
-        Self { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0, field_m: 0.0, field_rad: 0.0 };
-}
 
 /// What is estimated besides the two rigid links.
 #[expect(clippy::struct_excessive_bools, reason = "each is a choice of its own")]

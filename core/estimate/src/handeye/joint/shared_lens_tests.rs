@@ -4,15 +4,16 @@ use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::chain::correction_transform;
 use crate::handeye::joint::{Noise, camera_from_target, fit};
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::camera::Distortion;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::se3;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 const LENS: usize = 9;
 
 /// Sessions of one camera: both set-ups, unequal numbers of views and unequal noise.
-fn sessions() -> Vec<(Trial, Noise)> {
+fn sessions() -> Vec<(Session, Noise)> {
     let intrinsics = Intrinsics { distortion: Distortion::BrownConrady([-0.1, 0.05, 1e-3, -5e-4, 0.0]), ..camera() };
     let noises = [REALISTIC, Noise { corner_px: 0.2, ..REALISTIC }, Noise { robot_m: 5e-4, ..REALISTIC }];
     let modes = [(Mode::EyeInHand, 7), (Mode::EyeToHand, 6), (Mode::EyeInHand, 5)];
@@ -21,7 +22,7 @@ fn sessions() -> Vec<(Trial, Noise)> {
 }
 
 fn fitted(
-    session: &(Trial, Noise),
+    session: &(Session, Noise),
     solution: Option<&JointSolution>,
     lens_prior: Option<LensPrior<'_>>,
 ) -> Result<Fitted<JointSolution>, HandEyeError> {
@@ -37,14 +38,14 @@ fn fitted(
 /// All unknowns of all sessions, with nothing eliminated and every derivative a difference.
 #[derive(Clone)]
 struct Dense<'a> {
-    sessions: &'a [(Trial, Noise)],
+    sessions: &'a [(Session, Noise)],
     lens: Intrinsics,
     links: Vec<(Pose<Mount, Camera>, Pose<Anchor, Target>)>,
     corrections: Vec<Vec<Vector6<f64>>>,
 }
 
 impl<'a> Dense<'a> {
-    fn at_truth(sessions: &'a [(Trial, Noise)]) -> Self {
+    fn at_truth(sessions: &'a [(Session, Noise)]) -> Self {
         let links = sessions.iter().map(|(t, _)| (t.mount_from_camera, t.anchor_from_target)).collect();
         let corrections = sessions.iter().map(|(t, _)| vec![Vector6::zeros(); t.views.len()]).collect();
         Self { sessions, lens: sessions[0].0.intrinsics, links, corrections }

@@ -1,13 +1,14 @@
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::Noise;
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::targets::bent::BoardPoints;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// A robot whose errors change by 2 mm and 0.2° over the session.
 const FIELD: Noise = Noise { field_m: 2e-3, field_rad: 0.2 * std::f64::consts::PI / 180.0, ..REALISTIC };
 
-fn of_session(session: &Trial, board: &BoardPoints) -> (JointSolution, Option<JointSolution>) {
+fn of_session(session: &Session, board: &BoardPoints) -> (JointSolution, Option<JointSolution>) {
     let cancel = CancelToken::default();
     let problem = JointProblem { board, ..session.problem(false, None) };
     let without = fit(&problem, &session.start(), &cancel).expect("solves");

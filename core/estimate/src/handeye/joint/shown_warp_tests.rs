@@ -2,8 +2,9 @@ use super::*;
 use crate::bend::{Deflection, may_be_shown};
 use crate::handeye::Mode;
 use crate::handeye::joint::{Free, estimate, fit};
-use crate::testing::sessions::{REALISTIC, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::targets::bent::BoardShape;
+use handeye_simulate::session::{REALISTIC, camera, trial};
 
 /// The ratio one step from a flat fit, and whether a fit of the warps shows a bend, of a target that is bent so.
 fn of_session(views: usize, free_lens: bool, warp_m: [f64; 2], seed: u64) -> (Option<f64>, bool) {

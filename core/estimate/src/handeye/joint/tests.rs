@@ -2,9 +2,10 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::*;
 use crate::handeye::Mode;
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::camera::Distortion;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 #[test]
 fn exact_data_gives_the_exact_answer_in_both_set_ups() {
@@ -109,7 +110,7 @@ fn the_answer_does_not_depend_on_the_order_of_views() {
     let t = trial(Mode::EyeInHand, 12, &REALISTIC, camera(), 7);
     let mut reversed = trial(Mode::EyeInHand, 12, &REALISTIC, camera(), 7);
     reversed.views.reverse();
-    let solve = |t: &Trial| estimate(&t.problem(true, None), &t.start(), &CancelToken::default()).expect("solves");
+    let solve = |t: &Session| estimate(&t.problem(true, None), &t.start(), &CancelToken::default()).expect("solves");
     let (a, b) = (solve(&t), solve(&reversed));
     let (metres, radians) = a.hand_eye.mount_from_camera().distance_to(&b.hand_eye.mount_from_camera());
     // Noise levels are settled to a thousandth; what that leaves is far below a micrometre.

@@ -187,8 +187,9 @@ mod tests {
     use super::*;
     use crate::handeye::Mode;
     use crate::handeye::joint::{Noise, estimate, fit};
-    use crate::testing::sessions::{camera, trial};
+    use crate::test_sessions::Estimated as _;
     use handeye_geometry::progress::CancelToken;
+    use handeye_simulate::session::{camera, trial};
 
     /// Views that stayed in the fit would be predicted too well, and nobody would see it.
     #[test]

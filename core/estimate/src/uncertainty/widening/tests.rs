@@ -3,13 +3,14 @@ use nalgebra::{Isometry3, Vector3};
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::{Noise, estimate};
-use crate::testing::sessions::{REALISTIC, Trial, camera, trial};
+use crate::test_sessions::Estimated as _;
 use crate::uncertainty::quality;
 use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// An error of the robot that neighbouring poses share: a field in base axes that is linear in the position.
-fn bend(t: &mut Trial, per_metre: f64) {
+fn bend(t: &mut Session, per_metre: f64) {
     let mean = t.views.iter().map(|v| v.base_from_tip.translation()).sum::<Vector3<f64>>() / t.views.len() as f64;
     for view in &mut t.views {
         let off = view.base_from_tip.translation() - mean;
@@ -19,7 +20,7 @@ fn bend(t: &mut Trial, per_metre: f64) {
     }
 }
 
-fn solve(t: &Trial, free: bool) -> (JointSolution, Widening) {
+fn solve(t: &Session, free: bool) -> (JointSolution, Widening) {
     let problem = t.problem(free, None);
     let solution = estimate(&problem, &t.start(), &CancelToken::default()).expect("solves");
     let widening = check(&problem, &solution, &CancelToken::default()).expect("checks");

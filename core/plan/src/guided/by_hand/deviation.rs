@@ -137,7 +137,8 @@ mod tests {
     use nalgebra::{Isometry3, Translation3};
 
     use super::*;
-    use handeye_estimate::testing::sessions::{BOARD, camera};
+    use handeye_geometry::testing::BOARD;
+    use handeye_simulate::session::camera;
     use handeye_wording::English;
 
     /// A view of the middle of the board from 0.4 m, turned so.

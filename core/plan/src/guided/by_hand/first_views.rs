@@ -48,7 +48,8 @@ pub fn view(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use handeye_estimate::testing::sessions::{BOARD, camera};
+    use handeye_geometry::testing::BOARD;
+    use handeye_simulate::session::camera;
 
     #[test]
     fn the_first_views_have_the_whole_board_and_differ_by_more_than_a_hand_errs() {

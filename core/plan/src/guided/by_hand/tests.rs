@@ -56,12 +56,12 @@ fn first_views_are_asked_for_by_how_they_look_and_what_is_skipped_does_not_come_
     assert!(one.camera_from_target.rotation().angle_to(&other.camera_from_target.rotation()) > 0.3);
     // The view that there is, is not the one that is wanted; that one is.
     let judged = |pose: &Pose<Camera, Target>| {
-        let corners = hand::corners(&truth, pose).expect("the whole board");
+        let corners = hand::corners(truth.intrinsics(), pose).expect("the whole board");
         one.judge(&corners, &at)
     };
     assert!(!judged(&first).is_good);
     assert!(judged(&one.camera_from_target).is_good);
-    let all = hand::corners(&truth, &one.camera_from_target).expect("the whole board");
+    let all = hand::corners(truth.intrinsics(), &one.camera_from_target).expect("the whole board");
     assert!(!one.judge(&all[..60], &at).is_good, "the board is cut off");
     assert!(guide.guide().steps().is_empty(), "no tip pose was proposed");
 }

@@ -1,21 +1,22 @@
 use super::*;
 use crate::handeye::Mode;
 use crate::handeye::joint::with_stated_error;
-use crate::testing::sessions::{REALISTIC, Trial, add_waves, camera, trial};
+use crate::test_sessions::Estimated as _;
 use handeye_geometry::se3;
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// A session of a lens that is of its model but for waves of so many pixels.
-fn session(views: usize, waves_px: f64, seed: u64) -> Trial {
+fn session(views: usize, waves_px: f64, seed: u64) -> Session {
     let mut session = trial(Mode::EyeInHand, views, &REALISTIC, camera(), seed);
-    add_waves(&mut session.views, waves_px, 300.0);
+    session.add_waves(waves_px, 300.0);
     session
 }
 
-fn without(session: &Trial) -> JointSolution {
+fn without(session: &Session) -> JointSolution {
     fit(&session.problem(true, None), &session.start(), &CancelToken::default()).expect("solves")
 }
 
-fn shown(session: &Trial, without: &JointSolution) -> Option<(ShownDistortion, JointSolution)> {
+fn shown(session: &Session, without: &JointSolution) -> Option<(ShownDistortion, JointSolution)> {
     with_shown_distortion(&session.problem(true, None), without, &CancelToken::default()).expect("not cancelled")
 }
 
@@ -23,7 +24,7 @@ fn shown(session: &Trial, without: &JointSolution) -> Option<(ShownDistortion, J
 fn a_lens_beyond_its_model_is_seen_and_what_it_does_to_the_answer_is_counted() {
     let trials = 20;
     let (mut found, mut mahalanobis, mut plain) = (0, 0.0, 0.0);
-    let distance = |session: &Trial, solution: &JointSolution| {
+    let distance = |session: &Session, solution: &JointSolution| {
         let error = session.hand_eye_error(solution);
         error.dot(&(solution.hand_eye_covariance().try_inverse().expect("regular") * error))
     };

@@ -5,9 +5,11 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 
-use crate::{CameraKnowledge, Observations, ObservedView};
+use super::lens::pixel;
+use super::session::bent;
 use handeye_geometry::camera::Intrinsics;
-use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
+use handeye_geometry::observations::{CameraKnowledge, Observations, ObservedView};
+use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::targets::observation::Corner;
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_geometry::testing::looking_at;
@@ -65,7 +67,7 @@ impl BoardViews {
     pub fn corners(&self, count: usize, seed: u64) -> Vec<Vec<Corner>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let noise = Normal::new(0.0, self.noise_px).expect("a deviation");
-        let board = BoardPoints::new(&TargetSpec::Chessboard(self.grid).points());
+        let board = bent(&TargetSpec::Chessboard(self.grid).points(), self.shape.warp_m, self.shape.scale);
         let field = self.shared.map(|shared| (shared.part, self.root(shared.reach)));
         (0..count)
             .map(|i| {
@@ -80,7 +82,7 @@ impl BoardViews {
                 });
                 (0..board.len())
                     .map(|index| {
-                        let px = self.camera.project(&(pose * board.point(index, &self.shape))).expect("in front");
+                        let px = pixel(&self.camera, &(pose * board[index])).expect("in front");
                         let own = Vector2::new(noise.sample(&mut rng), noise.sample(&mut rng));
                         let error = shared.as_ref().map_or(own, |(part, [x, y])| {
                             Vector2::new(x[index], y[index]) * part.sqrt() + own * (1.0 - *part).sqrt()

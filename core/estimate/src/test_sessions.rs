@@ -1,0 +1,41 @@
+//! What tests of the estimate ask of a simulated session.
+
+use handeye_geometry::se3;
+use handeye_geometry::targets::bent::BoardShape;
+use handeye_simulate::session::Session;
+use nalgebra::Vector6;
+
+use crate::handeye::joint::{Free, JointProblem, JointSolution, JointStart, Noise};
+
+/// The joint estimate of a session whose links are known.
+pub(crate) trait Estimated {
+    /// The joint estimate's problem.
+    fn problem(&self, free_intrinsics: bool, noise: Option<Noise>) -> JointProblem<'_>;
+    /// A start as far off as a poor closed form: millimetres and tenths of a degree.
+    fn start(&self) -> JointStart;
+    /// Twist from the true link of the camera to the estimated one.
+    fn hand_eye_error(&self, solution: &JointSolution) -> Vector6<f64>;
+}
+
+impl Estimated for Session {
+    fn problem(&self, free_intrinsics: bool, noise: Option<Noise>) -> JointProblem<'_> {
+        let free = Free { intrinsics: free_intrinsics, ..Free::default() };
+        JointProblem { free, noise, ..JointProblem::new(self.mode, &self.board, &self.views) }
+    }
+
+    fn start(&self) -> JointStart {
+        let off = Vector6::new(0.004, -0.003, 0.005, 0.01, -0.008, 0.006);
+        JointStart {
+            mount_from_camera: self.mount_from_camera.perturbed(&off),
+            anchor_from_target: self.anchor_from_target.perturbed(&(-off)),
+            intrinsics: self.intrinsics,
+            shape: BoardShape::default(),
+            noise: None,
+        }
+    }
+
+    fn hand_eye_error(&self, solution: &JointSolution) -> Vector6<f64> {
+        let estimated = solution.hand_eye.mount_from_camera();
+        se3::log((self.mount_from_camera.inverse() * estimated).isometry())
+    }
+}

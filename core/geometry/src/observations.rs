@@ -1,0 +1,141 @@
+//! What a session saw, as an estimator is given it: who carries the camera, what is known of the lens, and one entry per image.
+
+use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{Distortion, Intrinsics};
+use crate::frames::{Anchor, Base, Camera, Mount, Pose, Target, Tip};
+use crate::targets::TargetSpec;
+use crate::targets::depth_plane::DepthPlane;
+use crate::targets::observation::{Corners, View};
+
+/// Where the camera sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// The camera is on the tip, the target stands still.
+    EyeInHand,
+    /// The camera stands still, the target is on the tip.
+    EyeToHand,
+}
+
+impl Mode {
+    /// The robot pose of a view in the frames of the common problem.
+    pub fn anchor_from_mount(self, base_from_tip: &Pose<Base, Tip>) -> Pose<Anchor, Mount> {
+        match self {
+            // Anchor is the base and mount the tip.
+            Self::EyeInHand => base_from_tip.relabel(),
+            // Anchor is the tip and mount the base.
+            Self::EyeToHand => base_from_tip.inverse().relabel(),
+        }
+    }
+}
+
+/// What was observed, from a dataset folder, a session or a live capture.
+#[derive(Debug, Clone)]
+pub struct Observations {
+    /// Where the camera sits; `None` when there is no robot and only the camera is calibrated.
+    pub mode: Option<Mode>,
+    /// The target.
+    pub target: TargetSpec,
+    /// Width and height of the images in pixels.
+    pub image_size: (u32, u32),
+    /// What is known about the camera.
+    pub camera: CameraKnowledge,
+    /// One entry per image, in the order of the pose table.
+    pub views: Vec<ObservedView>,
+}
+
+/// One image.
+#[derive(Debug, Clone)]
+pub struct ObservedView {
+    /// Its name in reports.
+    pub name: String,
+    /// The reported robot pose; `None` when there is no robot.
+    pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// The corners; `None` when the target was not found.
+    pub corners: Option<Corners>,
+    /// How the tip turns with each joint, as in [`View::tip_by_joint`]; empty where it is not known.
+    pub tip_by_joint: Vec<Vector6<f64>>,
+    /// The plane of the target by the depths of the image; `None` where none were measured.
+    pub depth: Option<DepthPlane>,
+    /// A target pose measured elsewhere, used when there are no corners.
+    pub camera_from_target: Option<Pose<Camera, Target>>,
+    /// Whether the view takes part; one that does not touches no number.
+    pub in_fit: bool,
+}
+
+impl ObservedView {
+    /// A view that takes part, of a robot whose joint angles are not known.
+    pub fn new(name: impl Into<String>, base_from_tip: Option<Pose<Base, Tip>>, corners: Option<Corners>) -> Self {
+        Self {
+            name: name.into(),
+            base_from_tip,
+            corners,
+            tip_by_joint: Vec::new(),
+            depth: None,
+            camera_from_target: None,
+            in_fit: true,
+        }
+    }
+}
+
+impl From<&View> for ObservedView {
+    /// A view that takes part.
+    fn from(view: &View) -> Self {
+        Self {
+            tip_by_joint: view.tip_by_joint.clone(),
+            depth: view.depth,
+            corners: Some(view.corners.clone()),
+            ..Self::new(view.name.clone(), Some(view.base_from_tip), None)
+        }
+    }
+}
+
+/// What is known about the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraKnowledge {
+    /// These intrinsics, taken as exact.
+    Fixed(Intrinsics),
+    /// Intrinsics are estimated.
+    Estimate {
+        /// The lens model; its coefficients do not matter.
+        model: Distortion,
+        /// Where to start; `None` finds a start from the views.
+        start: Option<Intrinsics>,
+    },
+}
+
+impl CameraKnowledge {
+    /// What is known when nothing is stated: intrinsics are estimated with [`DEFAULT_MODEL`].
+    pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
+}
+
+/// Lens model that is estimated when none is named: what OpenCV estimates by default.
+pub const DEFAULT_MODEL: Distortion = Distortion::BrownConrady([0.0; 5]);
+
+/// Noise levels, one standard deviation per axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a corner, pixels.
+    pub corner_px: f64,
+    /// Of what all corners of a view have in common beyond that, pixels: errors of lens, target and image that look like
+    /// a pose. A pose from `n` corners has the covariance `(corner_px² + view_px²) (Jᵀ J)⁻¹`. Zero where the data ask for
+    /// none.
+    pub view_px: f64,
+    /// Of the reported tip position, metres.
+    pub robot_m: f64,
+    /// Of the reported tip orientation, radians.
+    pub robot_rad: f64,
+    /// Of errors of the reported tip position that depend on where it is, as an affine function of it, metres: at a distance of the
+    /// RMS spread of the places from their mean. Zero where they are not in the model.
+    pub field_m: f64,
+    /// Of the reported tip orientation likewise, radians.
+    pub field_rad: f64,
+}
+
+impl Noise {
+    /// None at all.
+    pub const EXACT: Self =
+        Self { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0, field_m: 0.0, field_rad: 0.0 };
+}
