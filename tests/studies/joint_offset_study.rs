@@ -1,12 +1,11 @@
 //! Which joint offsets a session can tell, and what it costs to ask: `cargo run --example joint_offset_study -- SEEDS`.
 
-#[path = "support/information.rs"]
+#[path = "information.rs"]
 mod information;
 
-use handeye_cell::recorded::{SessionOptions, record};
 use handeye_cell::scene::Scene;
 use handeye_plan::ViewOptions;
-use information::{Information, JOINTS, Noise, POSES, SCALE, UNKNOWNS};
+use information::{Information, JOINTS, Noise, POSES, SCALE, UNKNOWNS, random_views};
 use nalgebra::DMatrix;
 
 type Failure = Box<dyn std::error::Error>;
@@ -33,7 +32,7 @@ fn main() -> Result<(), Failure> {
     ] {
         for (name, noise) in noises {
             println!("\n{views} views, {geometry}, {name}, median of {seeds} sessions");
-            study(&scene, &SessionOptions { views, look, ..SessionOptions::default() }, &noise, seeds)?;
+            study(&scene, views, &look, &noise, seeds)?;
         }
     }
     Ok(())
@@ -43,11 +42,12 @@ fn noise(robot_mm: f64, robot_deg: f64, corner_px: f64) -> Noise {
     Noise { corner_px, robot_m: robot_mm * 1e-3, robot_rad: robot_deg.to_radians() }
 }
 
-fn study(scene: &Scene, options: &SessionOptions, noise: &Noise, seeds: u64) -> Result<(), Failure> {
+fn study(scene: &Scene, views: usize, look: &ViewOptions, noise: &Noise, seeds: u64) -> Result<(), Failure> {
     let mut table = Table::default();
     for seed in 1..=seeds {
-        let session = record(scene, &SessionOptions { seed, ..*options })?;
-        let information = Information::of(&session, noise);
+        let truth = scene.resolve(seed)?;
+        let views = random_views(&truth, views, &ViewOptions { seed, ..*look });
+        let information = Information::of(&truth, &views, noise);
         let prior_rad = PRIOR_DEG.to_radians();
         for (rank, (sigma_deg, _)) in information.directions().into_iter().enumerate() {
             table.add(&format!("σ of direction {} [°], no prior", rank + 1), sigma_deg);

@@ -45,6 +45,7 @@ mod dh;
 mod error;
 mod inverse;
 mod joint;
+pub mod links;
 mod model;
 mod quantity;
 mod record;

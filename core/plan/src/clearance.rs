@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::capsule::Capsule;
 use super::carried::Carried;
-use super::links::{self, LinkCapsule};
+use handeye_arm::links::{self, LinkCapsule};
 use handeye_arm::{self as arm, ArmFrames, JointKind, JointValues};
 use handeye_geometry::frames::{Base, Pose, Tip};
 

@@ -22,7 +22,6 @@ mod clearance;
 mod contact;
 mod detour;
 pub mod guided;
-pub mod links;
 mod pace;
 mod sight;
 mod spread;
@@ -37,8 +36,8 @@ pub use contact::{Contact, Guard};
 pub use pace::Pace;
 pub use sight::Sight;
 pub use spread::{
-    PlanError, PlannedView, ViewOptions, ViewSetup, order_by_travel, poses_looking_at, poses_unlike,
-    random_poses_looking_at, shows_within, views_of_board,
+    PlanError, PlannedView, ViewOptions, ViewSetup, order_by_travel, poses_looking_at, poses_unlike, shows_within,
+    views_of_board,
 };
 pub use surroundings::{Obstacle, SpeedLimits, Surroundings, WorkVolume};
 

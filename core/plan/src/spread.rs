@@ -163,17 +163,6 @@ pub fn views_of_board(setup: &ViewSetup, options: &ViewOptions) -> Vec<PlannedVi
     Draws::new(setup, options).flatten().collect()
 }
 
-/// The first random views that show the whole board, that the arm reaches and that touch nothing: as a person without
-/// a plan would choose them. Whether the arm can be driven from one to the next is not asked.
-///
-/// # Errors
-/// [`PlanError`] says what the candidates failed at.
-pub fn random_poses_looking_at(setup: &ViewSetup, options: &ViewOptions) -> Result<Vec<PlannedView>, PlanError> {
-    let mut draws = Draws::new(setup, options);
-    let views = draws.by_ref().flatten().take(options.count).collect();
-    draws.result(views, 0)
-}
-
 /// Random views, each `None` when something is wrong with it, and what that was.
 struct Draws<'a> {
     setup: &'a ViewSetup,

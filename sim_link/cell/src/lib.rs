@@ -11,7 +11,8 @@
 //! # Ok::<(), handeye_cell::scene::SceneError>(())
 //! ```
 
-pub mod recorded;
-pub mod render;
+pub mod props;
 pub mod scene;
 pub mod world;
+
+pub use handeye_render as render;

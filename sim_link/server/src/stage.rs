@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 
 use handeye_arm::{Arm, JointValues};
-use handeye_cell::render::{Finish, Shape, Solid, props};
+use handeye_cell::props;
+use handeye_cell::render::{Finish, Shape, Solid};
 use handeye_cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, RobotErrors, Scene, SlipSpec};
 use handeye_cell::world::{
     Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError, turn_z,

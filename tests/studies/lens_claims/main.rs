@@ -182,8 +182,8 @@ fn halves_row(scene: &Scene, what: &str, sessions: u64) {
             let (Some(camera), Some(joint)) = (calibration.camera, &calibration.joint) else { continue };
             let Some((error_m, _)) = session.errors_m(&calibration) else { continue };
             let lens = camera.intrinsics;
-            let found = [lens.fx, lens.fy, lens.cx, lens.cy];
-            let off = std::array::from_fn(|k| found[k] - session.lens[k]);
+            let truth = session.lens;
+            let off = [lens.fx - truth.fx, lens.fy - truth.fy, lens.cx - truth.cx, lens.cy - truth.cy];
             with.add(&joint.covariance, off, joint, error_m, lens.fx);
             let places = LENS_AT..LENS_AT + lens.parameter_count();
             let before = widening::of_lens(&joint.covariance, places, joint.widening.lens.recip());

@@ -1,17 +1,17 @@
-//! Sessions of which the truth is known, drawn by code that shares nothing with the estimator: the projection, the chain and
-//! the rotations are written out here, and the robot errs in waves across its workspace, which no model of it follows.
+//! Sessions whose lens and links are drawn too, and whose robot errs in waves across its workspace, which no model of it follows.
 
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::{CameraKnowledge, Observations, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
-use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::frames::Pose;
 use handeye_geometry::targets::observation::Corner;
 use handeye_geometry::targets::{Grid, TargetSpec};
-use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
+use handeye_simulate::lens::pixel;
+use handeye_simulate::links::{Links, normal};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, StandardNormal};
 
 const COLUMNS: usize = 10;
 const ROWS: usize = 7;
@@ -67,49 +67,54 @@ impl Scene {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x1e45);
         let rng = &mut rng;
         let focal = rng.random_range(550.0..750.0);
-        // fx fy cx cy k1 k2 p1 p2 k3
-        let lens = [
-            focal,
-            focal * rng.random_range(0.999..1.001) / (1.0 + self.aspect),
-            rng.random_range(310.0..330.0),
-            rng.random_range(230.0..250.0),
-            rng.random_range(-0.2..0.05),
-            rng.random_range(-0.05..0.1),
-            rng.random_range(-1e-3..1e-3),
-            rng.random_range(-1e-3..1e-3),
-            rng.random_range(-0.02..0.02),
-        ];
-        let (hand_eye, target) = links(rng, self.mode);
+        let lens = Intrinsics {
+            fx: focal,
+            fy: focal * rng.random_range(0.999..1.001) / (1.0 + self.aspect),
+            cx: rng.random_range(310.0..330.0),
+            cy: rng.random_range(230.0..250.0),
+            distortion: Distortion::BrownConrady([
+                rng.random_range(-0.2..0.05),
+                rng.random_range(-0.05..0.1),
+                rng.random_range(-1e-3..1e-3),
+                rng.random_range(-1e-3..1e-3),
+                rng.random_range(-0.02..0.02),
+            ]),
+            width: SIZE.0,
+            height: SIZE.1,
+        };
+        let links = links(rng, self.mode);
         let waves = Waves::draw(rng, self.waves_m);
         let mut views = Vec::new();
         while views.len() < self.views {
             let camera_from_target = self.seen_at(rng);
-            let true_tip = match self.mode {
-                Mode::EyeInHand => target.times(&camera_from_target.inverse()).times(&hand_eye.inverse()),
-                Mode::EyeToHand => hand_eye.times(&camera_from_target).times(&target.inverse()),
-            };
+            let true_tip = *links.base_from_tip(&Pose::from_isometry(camera_from_target)).isometry();
             let Some(corners) = self.corners(rng, &lens, &camera_from_target) else { continue };
-            let noise = Rigid::small(normal3(rng) * self.robot.0, normal3(rng) * self.robot.1);
-            let reported = true_tip.times(&waves.at(&true_tip)).times(&noise);
-            views.push(ObservedView::new(format!("{:03}", views.len()), Some(reported.pose()), Some(corners.into())));
+            let noise = Isometry3::new(normal3(rng) * self.robot.0, normal3(rng) * self.robot.1);
+            let reported = Pose::from_isometry(true_tip * waves.at(&true_tip) * noise);
+            views.push(ObservedView::new(format!("{:03}", views.len()), Some(reported), Some(corners.into())));
         }
-        Session { mode: self.mode, lens, hand_eye, views }
+        Session { lens, links, views }
     }
 
-    fn seen_at(&self, rng: &mut ChaCha8Rng) -> Rigid {
+    fn seen_at(&self, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
         let tilt = self.tilt_deg.to_radians() * rng.random::<f64>().sqrt();
         let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
         let roll = rng.random_range(-self.roll_deg..self.roll_deg).to_radians();
-        let rotation =
-            turn(&(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)) * turn(&Vector3::new(0.0, 0.0, roll));
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)
+            * UnitQuaternion::from_scaled_axis(Vector3::z() * roll);
         let distance = rng.random_range(0.35..0.6);
         let beside = [0, 1].map(|_| rng.random_range(-self.beside..self.beside) * distance);
         let middle = Vector3::new((COLUMNS - 1) as f64, (ROWS - 1) as f64, 0.0) * (0.5 * SQUARE_M);
         let place = Vector3::new(beside[0], beside[1], distance);
-        Rigid { rotation, translation: place - rotation * middle }
+        Isometry3::from_parts(place.into(), rotation) * Translation3::from(-middle)
     }
 
-    fn corners(&self, rng: &mut ChaCha8Rng, lens: &[f64; 9], camera_from_target: &Rigid) -> Option<Vec<Corner>> {
+    fn corners(
+        &self,
+        rng: &mut ChaCha8Rng,
+        lens: &Intrinsics,
+        camera_from_target: &Isometry3<f64>,
+    ) -> Option<Vec<Corner>> {
         let shared: [Vector2<f64>; 6] =
             std::array::from_fn(|_| Vector2::new(normal(rng), normal(rng)) * (0.5 * self.shared_px));
         let mut corners = Vec::with_capacity(COLUMNS * ROWS);
@@ -118,8 +123,8 @@ impl Scene {
                 let (u, v) =
                     (2.0 * column as f64 / (COLUMNS - 1) as f64 - 1.0, 2.0 * row as f64 / (ROWS - 1) as f64 - 1.0);
                 let height = self.bend_m * (1.0 - u * u);
-                let point = Vector3::new(column as f64 * SQUARE_M, row as f64 * SQUARE_M, height);
-                let px = pixel(lens, &(camera_from_target.rotation * point + camera_from_target.translation));
+                let point = Point3::new(column as f64 * SQUARE_M, row as f64 * SQUARE_M, height);
+                let px = pixel(lens, &(camera_from_target * point))?;
                 let inside = px.min() > 2.0 && px.x < f64::from(SIZE.0) - 3.0 && px.y < f64::from(SIZE.1) - 3.0;
                 if !inside {
                     return None;
@@ -136,31 +141,22 @@ impl Scene {
 
 /// What was drawn.
 pub struct Session {
-    mode: Mode,
-    /// fx fy cx cy k1 k2 p1 p2 k3
-    pub lens: [f64; 9],
-    hand_eye: Rigid,
+    pub lens: Intrinsics,
+    links: Links,
     views: Vec<ObservedView>,
 }
 
 impl Session {
     /// With the lens given, its centre off by so many pixels.
     pub fn given(&self, centre_off: [f64; 2]) -> Observations {
-        let [fx, fy, cx, cy, k1, k2, p1, p2, k3] = self.lens;
-        let given = Intrinsics {
-            fx,
-            fy,
-            cx: cx + centre_off[0],
-            cy: cy + centre_off[1],
-            distortion: Distortion::BrownConrady([k1, k2, p1, p2, k3]),
-            ..Intrinsics::pinhole(SIZE.0, SIZE.1, fx)
-        };
-        Self::observed(Some(self.mode), CameraKnowledge::Fixed(given), self.views.clone())
+        let [across, down] = centre_off;
+        let given = Intrinsics { cx: self.lens.cx + across, cy: self.lens.cy + down, ..self.lens };
+        Self::observed(Some(self.links.mode), CameraKnowledge::Fixed(given), self.views.clone())
     }
 
     /// With the lens to be estimated.
     pub fn unknown(&self) -> Observations {
-        Self::observed(Some(self.mode), CameraKnowledge::NOTHING, self.views.clone())
+        Self::observed(Some(self.links.mode), CameraKnowledge::NOTHING, self.views.clone())
     }
 
     /// What the camera saw, without a robot.
@@ -172,7 +168,7 @@ impl Session {
     /// Both halves of a session whose lens is to be estimated: the views before the middle and those after it.
     pub fn halves(&self) -> [Observations; 2] {
         let (first, second) = self.views.split_at(self.views.len() / 2);
-        [first, second].map(|views| Self::observed(Some(self.mode), CameraKnowledge::NOTHING, views.to_vec()))
+        [first, second].map(|views| Self::observed(Some(self.links.mode), CameraKnowledge::NOTHING, views.to_vec()))
     }
 
     fn observed(mode: Option<Mode>, camera: CameraKnowledge, views: Vec<ObservedView>) -> Observations {
@@ -184,72 +180,22 @@ impl Session {
     pub fn errors_m(&self, calibration: &Calibration) -> Option<(f64, Option<f64>)> {
         let point = calibration.joint.as_ref()?.reference_point;
         let answer = calibration.hand_eye.as_ref()?.mount_from_camera();
-        let truth = self.hand_eye.rotation * point.coords + self.hand_eye.translation;
-        Some(((answer.isometry() * point - truth).coords.norm(), calibration.tip_error_95_m()))
+        let truth = self.links.mount_from_camera.isometry() * point;
+        Some(((answer.isometry() * point - truth).norm(), calibration.tip_error_95_m()))
     }
 }
 
 /// Camera and target where they are fixed.
-fn links(rng: &mut ChaCha8Rng, mode: Mode) -> (Rigid, Rigid) {
-    let mut near = |rotation: [f64; 3], place: [f64; 3]| Rigid {
-        rotation: turn(&(Vector3::from(rotation) + normal3(rng) * 0.1)),
-        translation: Vector3::from(place) + normal3(rng) * 0.03,
+fn links(rng: &mut ChaCha8Rng, mode: Mode) -> Links {
+    let mut near = |rotation: [f64; 3], place: [f64; 3]| {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(rotation) + normal3(rng) * 0.1);
+        Isometry3::from_parts((Vector3::from(place) + normal3(rng) * 0.03).into(), turn)
     };
-    match mode {
+    let (camera, target) = match mode {
         Mode::EyeInHand => (near([0.1, -0.1, 1.3], [0.05, 0.0, 0.08]), near([3.1, 0.0, 0.1], [0.45, 0.05, 0.0])),
         Mode::EyeToHand => (near([3.0, 0.1, 0.0], [0.45, 0.0, 1.0]), near([0.0, -0.1, 0.3], [-0.05, -0.05, 0.04])),
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Rigid {
-    rotation: Matrix3<f64>,
-    translation: Vector3<f64>,
-}
-
-impl Rigid {
-    fn small(translation: Vector3<f64>, rotation: Vector3<f64>) -> Self {
-        Self { rotation: turn(&rotation), translation }
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        Self {
-            rotation: self.rotation * other.rotation,
-            translation: self.rotation * other.translation + self.translation,
-        }
-    }
-
-    fn inverse(&self) -> Self {
-        let rotation = self.rotation.transpose();
-        Self { rotation, translation: -(rotation * self.translation) }
-    }
-
-    fn pose(&self) -> Pose<Base, Tip> {
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation));
-        Pose::from_isometry(Isometry3::from_parts(self.translation.into(), rotation))
-    }
-}
-
-/// Rodrigues' formula.
-fn turn(vector: &Vector3<f64>) -> Matrix3<f64> {
-    let angle = vector.norm();
-    if angle < 1e-12 {
-        return Matrix3::identity();
-    }
-    let a = vector / angle;
-    let cross = Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0);
-    Matrix3::identity() + cross * angle.sin() + cross * cross * (1.0 - angle.cos())
-}
-
-fn pixel(lens: &[f64; 9], point: &Vector3<f64>) -> Vector2<f64> {
-    let [fx, fy, cx, cy, k1, k2, p1, p2, k3] = *lens;
-    let (x, y) = (point.x / point.z, point.y / point.z);
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    Vector2::new(
-        fx * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + cx,
-        fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + cy,
-    )
+    };
+    Links { mode, mount_from_camera: Pose::from_isometry(camera), anchor_from_target: Pose::from_isometry(target) }
 }
 
 /// Errors of a robot that depend on where it is.
@@ -266,15 +212,12 @@ impl Waves {
         Self { amplitude_m, directions, phases: std::array::from_fn(|_| rng.random_range(0.0..6.3)) }
     }
 
-    fn at(&self, tip: &Rigid) -> Rigid {
-        let wave = |k: usize| (self.directions[k].dot(&tip.translation) + self.phases[k]).sin() * self.amplitude_m;
+    fn at(&self, tip: &Isometry3<f64>) -> Isometry3<f64> {
+        let wave =
+            |k: usize| (self.directions[k].dot(&tip.translation.vector) + self.phases[k]).sin() * self.amplitude_m;
         let rad_per_m = 0.2f64.to_radians() / 1e-3;
-        Rigid::small(Vector3::from_fn(|k, _| wave(k)), Vector3::from_fn(|k, _| wave(k + 3) * rad_per_m))
+        Isometry3::new(Vector3::from_fn(|k, _| wave(k)), Vector3::from_fn(|k, _| wave(k + 3) * rad_per_m))
     }
-}
-
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(rng)
 }
 
 fn normal3(rng: &mut ChaCha8Rng) -> Vector3<f64> {

@@ -3,7 +3,8 @@
 use std::sync::LazyLock;
 
 use handeye_arm::ArmKind;
-use handeye_cell::render::{Solid, props};
+use handeye_cell::props;
+use handeye_cell::render::Solid;
 use handeye_cell::scene::Scene;
 use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_geometry::frames::{Base, Pose, Tip};

@@ -114,8 +114,8 @@ fn camera_at_the_base(seed: u64) -> Option<GuidedCell> {
 fn is_hidden(cell: &GuidedCell, joints: &[f64]) -> bool {
     let chain = &cell.robot.arm.chain;
     let frames = chain.frames(joints).expect("its joints");
-    let at: Vec<Isometry3<f64>> = crate::links::arm_from_links(&frames).collect();
-    let links = crate::links::capsules(chain);
+    let at: Vec<Isometry3<f64>> = handeye_arm::links::arm_from_links(&frames).collect();
+    let links = handeye_arm::links::capsules(chain);
     let last = links.iter().map(|link| link.link).max();
     let eye = Point3::from(cell.links.mount_from_camera.translation());
     let tip = cell.robot.arm.tip(joints).expect("its joints");

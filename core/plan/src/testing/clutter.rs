@@ -9,9 +9,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::guided_cell::{CellSetup, GuidedCell};
 use crate::guided::{GuidedOptions, Outcome};
-use crate::links::{self, LinkCapsule};
 use crate::{Obstacle, SpeedLimits, travel};
 use handeye_arm::JointValues;
+use handeye_arm::links::{self, LinkCapsule};
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::testing::BOARD;
 

@@ -13,6 +13,7 @@ mod print;
 mod resolved;
 mod shipped;
 mod spec;
+#[cfg(feature = "planning")]
 mod view_setup;
 
 use std::path::Path;

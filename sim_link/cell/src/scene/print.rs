@@ -4,7 +4,7 @@ use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::{BoardSpec, PrintSpec};
-use crate::render::PrintErrors;
+use handeye_render::PrintErrors;
 
 /// Degrees of the products of polynomials that the smooth part is made of, along x and y: the second and third order. Order
 /// zero would be a displacement of the board, and the first a turn, a size and a shear.

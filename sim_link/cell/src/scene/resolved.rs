@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::render::{BoardSurface, Imaging, Light, LightSource, PrintErrors};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Sensor, Target, Tip};
 use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_render::{BoardSurface, Imaging, Light, LightSource, PrintErrors};
 use handeye_wire::axes::{sensor_from_camera, sheet_from_target};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 

@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::arm::ArmSpec;
-use crate::render::Sampling;
 use handeye_arm::JointValues;
 use handeye_motion::BoardMotionSpec;
+use handeye_render::Sampling;
 
 /// cos 45° = sin 45°, for quaternions of quarter and half turns.
 const HALF_SQRT: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -348,3 +348,30 @@ fn a_scene_made_in_code_is_checked_too() {
     scene.camera.far_m = f64::NAN;
     assert!(scene.resolve(1).is_err());
 }
+
+/// What data sets say of the arm of the cell, and how the tip turns with its joints, is what the cell does.
+#[test]
+fn the_arm_of_data_sets_is_the_arm_of_the_cell_and_an_offset_of_a_joint_turns_the_tip_by_its_twist() {
+    let mut scene = Scene::realistic().unwrap();
+    (scene.robot.repeatability_mm, scene.robot.repeatability_deg) = (0.0, 0.0);
+    let offset_deg = 0.2;
+    for joint in 0..6 {
+        let offsets = JointValues::from_fn(6, |j| if j == joint { offset_deg } else { 0.0 });
+        scene.robot.joint_offset_deg = Some(offsets);
+        let truth = scene.resolve(3).unwrap();
+        let arm = ArmKind::Ur5Coppeliasim.arm();
+        let arm = arm
+            .clone()
+            .mounted(truth.world_from_arm * arm.base_from_first, arm.flange_from_tip * truth.connection_from_tip);
+        for moved in 0..6 {
+            let joints = JointValues::from_fn(6, |j| truth.start_joints[j] + 0.3 * ((3 * j + moved) as f64).sin());
+            let tip = truth.reported_tip(&joints).unwrap();
+            let (distance_m, angle_rad) = arm.forward(&joints).unwrap().distance_to(&tip);
+            assert!(distance_m < 1e-12 && angle_rad < 1e-7, "acos near 1 has half the digits");
+            // The motion of one joint is a screw, and its exponential exact.
+            let twist = arm.tip_by_joint(&joints).unwrap()[joint] * f64::to_radians(offset_deg);
+            let (off_m, off_rad) = tip.perturbed(&twist).distance_to(&truth.true_tip(&joints, 1).unwrap());
+            assert!(off_m < 1e-12 && off_rad < 1e-7, "joint {}: {off_m} m", joint + 1);
+        }
+    }
+}

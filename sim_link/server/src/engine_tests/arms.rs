@@ -6,7 +6,6 @@ use handeye_arm::{JointKind, JointValues};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
 use super::*;
-use handeye_cell::recorded::{SessionOptions, record};
 use handeye_cell::render::Shape;
 use handeye_cell::world::Chain;
 use handeye_plan::{ViewOptions, ViewSetup, poses_looking_at};
@@ -197,7 +196,7 @@ fn a_joint_goes_to_its_target_as_fast_as_its_maker_says() {
 }
 
 #[test]
-fn views_of_the_board_are_found_for_the_arms_of_shipped_scenes_and_a_session_with_them_is_what_the_truth_shows() {
+fn views_of_the_board_are_found_for_the_arms_of_shipped_scenes() {
     for name in ["panda.toml", "xarm6.toml"] {
         let scene = shipped(name);
         let truth = scene.resolve(1).expect("valid");
@@ -212,17 +211,6 @@ fn views_of_the_board_are_found_for_the_arms_of_shipped_scenes_and_a_session_wit
             let (distance_m, angle_rad) =
                 truth.reported_tip(&view.joints).expect("its joints").distance_to(&view.base_from_tip);
             assert!(distance_m < 1e-7 && angle_rad < 1e-7, "{name}: {distance_m} m");
-        }
-        let options = SessionOptions { corner_px: 0.0, ..SessionOptions::default() };
-        let session = record(&scene, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
-        for view in &session.views {
-            assert_eq!((view.joints_rad.len(), view.corners.len()), (truth.arm.joint_count(), 70));
-            let camera_from_target = truth.camera_from_target(&view.base_from_tip);
-            for corner in &view.corners {
-                let seen = camera_from_target.isometry() * truth.target.points()[corner.index];
-                let px = truth.intrinsics.project(&seen).expect("in front");
-                assert!((px - corner.px).norm() < 1e-3, "{name}: {px}");
-            }
         }
     }
 }

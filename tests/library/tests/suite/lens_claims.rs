@@ -37,7 +37,7 @@ fn a_given_lens_whose_centre_is_half_a_pixel_off_is_named_and_counted() {
             assert_eq!(finding.severity, Severity::Warning);
             let said = finding.to_string();
             assert!(said.contains("half a pixel"), "{mode:?} {seed}: {said}");
-            let right = format!("cx = {:.2} and cy = {:.2}", session.lens[2], session.lens[3]);
+            let right = format!("cx = {:.2} and cy = {:.2}", session.lens.cx, session.lens.cy);
             assert!(said.contains(&right), "{mode:?} {seed}: {said}, not {right}");
             let (error_m, stated_m) = session.errors_m(&calibration).expect("answered");
             let stated_m = stated_m.expect("one cause explains it");
@@ -92,7 +92,7 @@ fn fx_and_fy_that_differ_by_more_than_those_of_a_camera_are_named() {
             assert_eq!(finding.severity, Severity::Warning);
             let (ratio, sigma) =
                 (finding.value("fx_over_fy").expect("there"), finding.value("fx_over_fy_sigma").expect("there"));
-            let truth = session.lens[0] / session.lens[1];
+            let truth = session.lens.fx / session.lens.fy;
             assert!((ratio - truth).abs() < 4.0 * sigma && sigma < 2e-3, "{ratio} ± {sigma} for {truth}");
             assert!(finding.to_string().contains("scaled in one direction"), "{finding}");
         }

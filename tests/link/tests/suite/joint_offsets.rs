@@ -1,19 +1,20 @@
 //! Which joint offsets a session of the cell can tell beside the hand-eye transform.
 
-#[path = "../../../studies/support/information.rs"]
+#[path = "../../../studies/information.rs"]
 mod information;
 
-use handeye_cell::recorded::{SessionOptions, record};
 use handeye_cell::scene::Scene;
-use information::{Information, Noise};
+use handeye_plan::ViewOptions;
+use information::{Information, Noise, random_views};
 
 #[test]
 fn the_first_and_the_last_joint_are_absorbed_and_the_four_between_are_told() {
     let scene = Scene::realistic().expect("built in");
     let noise = Noise { corner_px: 0.1, robot_m: 0.05e-3, robot_rad: 0.01_f64.to_radians() };
     for seed in 1..=3 {
-        let session = record(&scene, &SessionOptions { seed, ..SessionOptions::default() }).expect("a session");
-        let information = Information::of(&session, &noise);
+        let truth = scene.resolve(seed).expect("valid");
+        let views = random_views(&truth, 20, &ViewOptions { seed, ..ViewOptions::default() });
+        let information = Information::of(&truth, &views, &noise);
         let directions = information.directions();
         // Nothing is known of two directions but rounding: a part in 10¹² of the information on the best known.
         for (sigma_deg, direction) in &directions[..2] {

@@ -1,7 +1,8 @@
 //! The bodies of the arm.
 
 use egui::Color32;
-use handeye_cell::render::{Shape, props};
+use handeye_cell::props;
+use handeye_cell::render::Shape;
 use nalgebra::Point3;
 
 use super::canvas::{Canvas, Cylinder};

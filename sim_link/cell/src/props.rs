@@ -2,10 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Finish, Shape, Solid};
 use crate::scene::ArmSpec;
-use handeye_arm::{Arm, ArmKind};
-use handeye_plan::links;
+use handeye_arm::{Arm, ArmKind, links};
+use handeye_render::{Finish, Shape, Solid};
 
 /// Turned aluminium of tubes and housings.
 pub const ALUMINIUM: [f32; 3] = [0.76, 0.78, 0.80];

@@ -1,8 +1,10 @@
 //! What a session says about hand-eye transform, place of the board and joint offsets: the linear model at the truth.
 
-use handeye_cell::recorded::RecordedSession;
+use handeye_arm::JointValues;
+use handeye_cell::scene::ResolvedScene;
 use handeye_geometry::frames::Pose;
 use handeye_geometry::se3::{adjoint, skew};
+use handeye_plan::{ViewOptions, ViewSetup, views_of_board};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SymmetricEigen, Vector6};
 
 /// Hand-eye transform and place of the board.
@@ -26,6 +28,16 @@ pub struct Noise {
 /// perturbations, metres, radians and relative, with the robot's corrections of every view eliminated.
 pub struct Information(pub DMatrix<f64>);
 
+/// Joint values of so many random views of the board, as a person without a plan would choose them.
+///
+/// # Panics
+/// When the cell has fewer.
+pub fn random_views(truth: &ResolvedScene, count: usize, options: &ViewOptions) -> Vec<JointValues> {
+    let views = views_of_board(&ViewSetup::from(truth), options);
+    assert!(views.len() >= count, "{} views", views.len());
+    views.into_iter().take(count).map(|view| view.joints).collect()
+}
+
 /// `camera_from_target · exp(A · [x; y; δ] + B · e)` for the unknowns and the correction `e` of the tip.
 struct Linear {
     unknowns: SMatrix<f64, 6, UNKNOWNS>,
@@ -33,17 +45,17 @@ struct Linear {
 }
 
 impl Information {
-    pub fn of(session: &RecordedSession, noise: &Noise) -> Self {
+    /// Of views from these joint values.
+    pub fn of(truth: &ResolvedScene, views: &[JointValues], noise: &Noise) -> Self {
         let mut normal = DMatrix::zeros(UNKNOWNS, UNKNOWNS);
         let robot = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| {
             (if i < 3 { noise.robot_m } else { noise.robot_rad }).powi(2)
         }));
-        for view in &session.views {
-            let tip = session.truth.reported_tip(&view.joints_rad).expect("joints of the arm");
-            let camera_from_target = *session.truth.camera_from_target(&tip).isometry();
-            let Linear { unknowns, correction } =
-                linear(session, &view.joints_rad, tip.isometry(), &camera_from_target);
-            let seen = pose_information(session, &camera_from_target) / noise.corner_px.powi(2);
+        for joints in views {
+            let tip = truth.reported_tip(joints).expect("joints of the arm");
+            let camera_from_target = *truth.camera_from_target(&tip).isometry();
+            let Linear { unknowns, correction } = linear(truth, joints, tip.isometry(), &camera_from_target);
+            let seen = pose_information(truth, &camera_from_target) / noise.corner_px.powi(2);
             let spread =
                 seen.try_inverse().expect("70 corners determine a pose") + correction * robot * correction.transpose();
             let weight = spread.try_inverse().expect("a covariance is positive");
@@ -85,18 +97,18 @@ impl Information {
 }
 
 fn linear(
-    session: &RecordedSession,
+    truth: &ResolvedScene,
     joints_rad: &[f64],
     base_from_tip: &Isometry3<f64>,
     camera_from_target: &Isometry3<f64>,
 ) -> Linear {
-    let target_from_base = session.truth.base_from_target.isometry().inverse();
+    let target_from_base = truth.base_from_target.isometry().inverse();
     let correction = -adjoint(&(target_from_base * base_from_tip));
     let mut unknowns = SMatrix::<f64, 6, UNKNOWNS>::zeros();
     unknowns.fixed_view_mut::<6, 6>(0, 0).copy_from(&-adjoint(&camera_from_target.inverse()));
     unknowns.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
-    let arm = &session.truth.arm;
-    let placed = arm.clone().mounted(session.truth.world_from_arm * arm.base_from_first, arm.flange_from_tip);
+    let arm = &truth.arm;
+    let placed = arm.clone().mounted(truth.world_from_arm * arm.base_from_first, arm.flange_from_tip);
     let twists = placed.tip_by_joint_at(&Pose::from_isometry(*base_from_tip), joints_rad).expect("six joints");
     for (j, twist) in twists.iter().enumerate() {
         unknowns.set_column(POSES + j, &(correction * twist));
@@ -108,11 +120,10 @@ fn linear(
 }
 
 /// `JᵀJ` of all corners in the pose of the target, per square pixel.
-fn pose_information(session: &RecordedSession, camera_from_target: &Isometry3<f64>) -> Matrix6<f64> {
+fn pose_information(truth: &ResolvedScene, camera_from_target: &Isometry3<f64>) -> Matrix6<f64> {
     let rotation = camera_from_target.rotation.to_rotation_matrix();
-    session.truth.target.points().iter().fold(Matrix6::zeros(), |sum, point| {
-        let seen = session
-            .truth
+    truth.target.points().iter().fold(Matrix6::zeros(), |sum, point| {
+        let seen = truth
             .intrinsics
             .project_with_jacobians(&(camera_from_target * point))
             .expect("planned views show the board");

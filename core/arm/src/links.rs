@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use handeye_arm::{Arm, ArmFrames, JointKind};
+use crate::{Arm, ArmFrames, JointKind};
 
 /// Radius of the link at the base and of the one at the tip, metres: those of arms for some kilograms.
 const RADII_M: [f64; 2] = [0.06, 0.04];
@@ -68,7 +68,7 @@ pub fn arm_from_links(frames: &ArmFrames) -> impl Iterator<Item = Isometry3<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use handeye_arm::ArmKind;
+    use crate::ArmKind;
 
     #[test]
     fn the_foot_of_an_arm_stands_and_all_else_moves() {
