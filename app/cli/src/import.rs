@@ -23,8 +23,9 @@ use handeye_workbench::import::understand::{self, NotUnderstood};
 
 /// At the end of its help.
 pub fn after_help() -> String {
+    let formats: String = understand::formats_said().iter().map(|line| format!("  {}\n", line.say(English))).collect();
     format!(
-        "Keys of --set:\n{}\n\nExamples, on a recording without a description of what its files mean:\n  \
+        "What is read:\n{formats}\nKeys of --set:\n{}\n\nExamples, on a recording without a description of what its files mean:\n  \
          handeye sample --out recording && rm recording/dataset.toml\n  \
          handeye import recording --target 10x7x15 --set mode=eye_in_hand\n  \
          handeye import recording --target 10x7x15 --set mode=eye_in_hand \\\n      --out my_robot_images",
@@ -157,7 +158,7 @@ impl Told {
             let document = json!({
                 "format": "handeye-import",
                 "version": 1,
-                "found": recording.beliefs,
+                "found": in_english(&recording.beliefs),
                 "warnings": in_english(&recording.warnings),
                 "notes": self.notes,
                 "judgement": findings,
@@ -200,7 +201,7 @@ fn import(
     looked.notes.iter().for_each(|note| told.note(note.say(English)));
     let recording = &*looked.recording;
     for clocks in &recording.clocks {
-        told.line(format_args!("Clocks: {}", understand::clocks_said(clocks).say(English)));
+        told.line(format_args!("Clocks: {}", clocks.said().say(English)));
     }
     let judgement = looked.judge(settings, cancel).map_err(refused)?;
     let is_open_in_mode = settings.mode.is_none() && judgement.is_open_in_mode_alone();
@@ -293,7 +294,7 @@ fn looked_at(done: usize, of: usize) {
 fn found(recording: &Recording) -> String {
     let mut text = String::from("Found:\n");
     for belief in &recording.beliefs {
-        text.extend(["  ", belief, "\n"]);
+        text.extend(["  ", &belief.say(English), "\n"]);
     }
     for warning in &recording.warnings {
         text.extend(["  note: ", &warning.say(English), "\n"]);

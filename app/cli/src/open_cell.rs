@@ -230,9 +230,9 @@ impl OpenCell {
     /// # Errors
     /// [`PortError`].
     pub fn take_up_again(&mut self) -> Result<(), PortError> {
-        self.control.renew();
-        self.camera.renew();
-        self.motion.renew();
+        self.control.renew()?;
+        self.camera.renew()?;
+        self.motion.renew()?;
         self.set_going(self.is_stepped)
     }
 

@@ -59,7 +59,7 @@ pub fn with_arm(recording: &Recording, arm: &str) -> Result<Recording, ImportErr
     if out.tracks.iter().all(|track| track.role == Role::Target) {
         return Err(fail(reasons(troubles)));
     }
-    out.beliefs.push(format!("poses are computed from joint values by the chain of {}", chain.name));
+    out.beliefs.push(text!("poses are computed from joint values by the chain of {arm}", arm = &chain.name));
     out.warnings.extend(troubles);
     Ok(out)
 }
@@ -164,13 +164,16 @@ impl Chain {
     }
 
     /// What is said of values that the arm has no joints for.
-    fn left_out(&self, series: &JointSeries) -> Option<String> {
+    fn left_out(&self, series: &JointSeries) -> Option<Text> {
         let (count, has) = (self.arm.joint_count(), series.samples.first()?.values.len());
         let is_open = series.joints.is_empty() && has > count && self.row_of(series).is_none();
         is_open.then(|| {
-            format!(
-                "{} has {has} values a row: the first {count} are taken for the joints of {}",
-                series.name, self.name
+            text!(
+                "{series} has {has} values a row: the first {count} are taken for the joints of {arm}",
+                series = &series.name,
+                has = has,
+                count = count,
+                arm = &self.name
             )
         })
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::formats::with_poses;
 use handeye_estimate::clock_offset::ClockOffsetError;
 use handeye_files::budget::Spent;
 use handeye_wording::Text;
@@ -42,8 +43,9 @@ pub enum ImportError {
     AlreadyADataset(PathBuf),
     /// There is nothing that could be robot poses.
     #[error(
-        "{folder}: no series of at least {need} poses was found (tables, JSON, YAML, XML, npz and bags of ROS are read): {seen}",
-        folder = folder.display()
+        "{folder}: no series of at least {need} poses was found ({formats} are read): {seen}",
+        folder = folder.display(),
+        formats = with_poses()
     )]
     NoPoses {
         /// The folder.

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::ImportError;
+use super::formats::of_ending;
 pub(super) use super::naming::{groups, naming, shown};
 use super::recording::{ImageFile, Stream};
 use handeye_files::bounds::Bounds;
@@ -23,10 +24,6 @@ const MAX_DEPTH: usize = 4;
 const MAX_TEXT_BYTES: u64 = 1 << 26;
 /// Images of one naming that make a stream.
 const LEAST_IMAGES: usize = 3;
-
-/// How files are called that have series of poses and nothing that another file needs.
-const SERIES: [&str; 15] =
-    ["csv", "txt", "tsv", "dat", "log", "", "json", "jsonl", "samples", "npz", "npy", "script", "src", "mod", "ls"];
 
 const IMAGES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
 
@@ -61,10 +58,7 @@ pub(super) fn list(
     });
     if let Some(only) = &only {
         // Beside a file that was named only what it may refer to counts: images, the description of a camera.
-        files.retain(|file| {
-            let is_others = ending(file) == "calib" && file.file_stem() != only.file_stem();
-            file == only || !(is_bag(file) || SERIES.contains(&&*ending(file)) || is_others)
-        });
+        files.retain(|file| file == only || of_ending(file).is_none_or(|(format, _)| format.is_beside(file, only)));
     }
     files.sort_by(|a, b| natural_order::compare(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok((root, files, only))
@@ -148,15 +142,6 @@ pub(super) fn ending(path: &Path) -> String {
 
 pub(super) fn is_image(path: &Path) -> bool {
     IMAGES.contains(&&*ending(path))
-}
-
-/// Whether a file is one of a bag of ROS.
-pub(super) fn is_bag(path: &Path) -> bool {
-    match &*ending(path) {
-        "mcap" | "db3" | "bag" => true,
-        "zstd" => matches!(&*ending(&path.with_extension("")), "mcap" | "db3"),
-        _ => false,
-    }
 }
 
 /// The bytes of a file that is not too large.

@@ -37,6 +37,7 @@ mod sight;
 mod timing;
 mod value;
 pub mod write;
+mod xml;
 
 #[cfg(test)]
 mod golden_tests;
@@ -55,6 +56,7 @@ pub use camera::chosen as chosen_camera;
 pub use chain::with_arm;
 pub use conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm};
 pub use error::ImportError;
+pub use formats::formats;
 pub use hypothesis::{Convention, Fit, Hypothesis, Source};
 pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
 pub use pairing::Pairing;

@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::folder;
-use super::formats::{blocks, npz, table, tree, xml};
-use super::value::{self, Value};
-use handeye_files::budget::Budget;
+use super::formats::{Content, Encoding, File, of_ending};
+use super::reader::{Reader, content};
 use handeye_wording::Text;
 use handeye_wording::text;
 
@@ -17,11 +16,11 @@ const MOST_LOOKED_AT: usize = 200;
 const LARGEST: u64 = 1 << 20;
 
 /// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
-pub(super) fn reasons(root: &Path, files: &[PathBuf], budget: &Budget<'_>) -> Vec<Text> {
+pub(super) fn reasons(reader: &Reader<'_>, files: &[PathBuf]) -> Vec<Text> {
     let mut told: Vec<(Likely, Text)> = Vec::new();
     for members in folder::groups(files, true).iter().take(MOST_LOOKED_AT) {
-        let Some((first, _)) = members.first().filter(|_| !budget.is_spent()) else { continue };
-        let Some((likely, why)) = reason(&root.join(first), budget) else { continue };
+        let Some((first, _)) = members.first().filter(|_| !reader.budget.is_spent()) else { continue };
+        let Some((likely, why)) = reason(first, reader) else { continue };
         let shown = folder::shown(members.iter().map(|(file, _)| file.as_path()));
         let name = if members.len() == 1 { first.display().to_string() } else { shown };
         told.push((likely, text!("{name} has {why}", name = name, why = why)));
@@ -36,7 +35,7 @@ pub(super) fn reasons(root: &Path, files: &[PathBuf], budget: &Budget<'_>) -> Ve
 
 /// How likely a file was meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Likely {
+pub(super) enum Likely {
     Poses,
     Numbers,
     Neither,
@@ -56,62 +55,23 @@ fn not_read(file: &Path) -> Option<Text> {
     })
 }
 
-/// What a file has in place of a series; `None` of one that is no text and no array.
-fn reason(file: &Path, budget: &Budget<'_>) -> Option<(Likely, Text)> {
-    let is_small = std::fs::metadata(file).is_ok_and(|found| found.len() <= LARGEST);
-    let text = || folder::text(file).ok().filter(|_| is_small);
-    let of_document = |value: Result<Value, Text>| match value {
-        Ok(value) => document(&value),
-        Err(why) => (Likely::Numbers, text!("something else than its name says: {why}", why = why)),
-    };
-    Some(match folder::ending(file).as_str() {
-        "json" | "jsonl" | "samples" => of_document(value::json(&text()?)),
-        "yaml" | "yml" => of_document(value::yaml(&text()?).map(Value::List)),
-        "xml" => {
-            let text = text()?;
-            match value::opencv_xml(&text).or_else(|| xml::document(&text)) {
-                Some(value) => document(&value),
-                None => (
-                    Likely::Neither,
-                    text!("nothing that is read as records: elements of one name with six numbers or more"),
-                ),
+/// What a file has in place of a series; `None` of one that is of no format with poses.
+fn reason(file: &Path, reader: &Reader<'_>) -> Option<(Likely, Text)> {
+    let path = reader.root.join(file);
+    let is_small = std::fs::metadata(&path).is_ok_and(|found| found.len() <= LARGEST);
+    let (format, encoding) = of_ending(file).filter(|_| is_small)?;
+    let content = match encoding {
+        Encoding::Own | Encoding::Bag => Content::Unread,
+        _ => match content(encoding, folder::text(&path).ok()?) {
+            Ok(Some(content)) => content,
+            Ok(None) => {
+                let why = text!("nothing that is read as records: elements of one name with six numbers or more");
+                return Some((Likely::Neither, why));
             }
-        }
-        "csv" | "txt" | "tsv" | "dat" | "log" => of_text(&text()?),
-        // Programs and licences have no ending either.
-        "" => Some(of_text(&text()?)).filter(|(likely, _)| *likely != Likely::Neither)?,
-        "npz" | "npy" if is_small => document(&npz::document(&folder::bytes(file).ok()?, budget)?),
-        _ => return None,
-    })
-}
-
-fn document(value: &Value) -> (Likely, Text) {
-    match tree::fields(value).poses.len() {
-        0 => (Likely::Neither, text!("no fields that are poses")),
-        1 => (Likely::Poses, text!("one pose, and three make a series")),
-        many => (Likely::Poses, text!("{count} poses under different names, which are no series", count = many)),
-    }
-}
-
-fn of_text(text: &str) -> (Likely, Text) {
-    let widths = table::widths(text);
-    let Some((width, rows)) = widths.iter().max_by_key(|(_, rows)| **rows) else {
-        let poses = blocks::document(text).map_or(0, |value| tree::fields(&value).poses.len());
-        return if poses > 0 {
-            (Likely::Poses, text!("{count} of the poses of which three make a series", count = poses))
-        } else {
-            (Likely::Neither, text!("no rows of numbers"))
-        };
+            Err(why) => return Some((Likely::Numbers, text!("something else than its name says: {why}", why = why))),
+        },
     };
-    let why = match (*rows, width) {
-        (1, _) => text!("one row of {width} numbers, and three make a series"),
-        (2, _) => text!("two rows of {width} numbers, and three make a series"),
-        (_, 5..=8) => text!(
-            "{rows} rows of {width} numbers that are no poses: if they are joint values, name the arm with arm=NAME"
-        ),
-        _ => text!("{rows} rows of {width} numbers, of which poses are not made"),
-    };
-    (Likely::Numbers, why.with("rows", rows).with("width", width))
+    format.instead(&File { path: file.to_path_buf(), number: None, content }, reader)
 }
 
 #[cfg(test)]

@@ -5,14 +5,16 @@ use std::time::Duration;
 
 use super::error::ImportError;
 use super::folder;
-use super::formats::moveit;
+use super::formats::{ALL, Encoding, of_ending};
 use super::nothing;
 use super::reader::Reader;
-use super::recording::{FoundTarget, Recording, Track};
+use super::recording::{FoundCamera, FoundTarget, JointSeries, Recording, Stream, Track};
 use handeye_files::bounds::Bounds;
 use handeye_files::budget::{Budget, Limits};
 use handeye_files::own_folder::{DESCRIPTION, is_session};
 use handeye_geometry::progress::CancelToken;
+use handeye_wording::Text;
+use handeye_wording::text;
 
 /// Looks at a folder, or at a file and what lies beside it, without a limit of time.
 ///
@@ -38,77 +40,42 @@ pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<
     recording.root.clone_from(&root);
     recording.streams = folder::streams(&root, &files, budget, &mut recording.warnings);
     budget.check().map_err(stopped)?;
-    for stream in &recording.streams {
-        let depth = if stream.is_depth { ", 16 bits in one channel: depth" } else { "" };
-        let (first, last) = (stream.images.first(), stream.images.last());
-        let ends = first.zip(last).map(|(a, b)| format!(", {} to {}", a.shown(), b.shown())).unwrap_or_default();
-        let (width, height) = stream.size;
-        recording.beliefs.push(format!(
-            "{} images {} of {width}×{height} px{ends}{depth}",
-            stream.images.len(),
-            stream.name
-        ));
-    }
+    recording.beliefs.extend(recording.streams.iter().map(Stream::said));
     let mut reader = Reader::new(&root, recording, budget);
+    let is_bag = |file: &PathBuf| of_ending(file).is_some_and(|(_, encoding)| encoding == Encoding::Bag);
     let (bags, others): (Vec<PathBuf>, Vec<PathBuf>) =
-        files.iter().filter(|file| !folder::is_image(file)).cloned().partition(|file| folder::is_bag(file));
+        files.iter().filter(|file| !folder::is_image(file)).cloned().partition(is_bag);
     let (own, beside): (Vec<PathBuf>, Vec<PathBuf>) =
         others.into_iter().partition(|file| named.as_ref().is_none_or(|named| named == file));
     for members in folder::groups(&own, true) {
         reader.group(&members);
     }
     reader.companions(&beside);
-    reader.bags(&bags);
+    reader.group(&bags.into_iter().map(|bag| (bag, None)).collect::<Vec<_>>());
     if named.is_some() {
         reader.named_images();
     }
     budget.check().map_err(stopped)?;
-    let mut recording = reader.recording;
-    (recording.still, recording.tracks) = recording.tracks.into_iter().partition(Track::is_still);
-    if moveit::know(&mut recording.tracks) {
-        recording.beliefs.push("the poses are samples of MoveIt calibration, by their names".into());
-    }
-    if recording.tracks.is_empty() && recording.joints.is_empty() && recording.motions.is_empty() {
-        recording.nothing = nothing::reasons(&root, &files, budget);
+    let found = &mut reader.recording;
+    (found.still, found.tracks) = std::mem::take(&mut found.tracks).into_iter().partition(Track::is_still);
+    ALL.iter().for_each(|format| format.finish(found));
+    if found.tracks.is_empty() && found.joints.is_empty() && found.motions.is_empty() {
+        reader.recording.nothing = nothing::reasons(&reader, &files);
         budget.check().map_err(stopped)?;
     }
-    for stream in recording.streams.iter().filter(|stream| stream.points.is_some()) {
-        let (width, height) = stream.size;
-        let size = if stream.size == (0, 0) {
-            "no file says of which size".into()
-        } else {
-            format!("of {width}×{height} px")
-        };
-        let points = stream.points.iter().flatten().flatten();
-        let (views, most) = (points.clone().count(), points.map(Vec::len).max().unwrap_or(0));
-        recording.beliefs.push(format!("up to {most} corners of {views} images ({size}) in {}", stream.name));
-    }
-    for track in &recording.tracks {
-        let joints = track.samples.iter().filter(|s| !s.joints.is_empty()).count();
-        let with = if joints > 0 { format!(", {joints} of them with joint values") } else { String::new() };
-        let kind = match track.samples[0].numbers {
-            super::Numbers::Angles(_) => "six numbers",
-            super::Numbers::Quaternion(_) => "translation and quaternion",
-            super::Numbers::Matrix(_) => "matrices",
-        };
-        recording.beliefs.push(format!("{} poses in {}: {kind}{with}", track.samples.len(), track.name));
-    }
-    for track in &recording.still {
-        recording.beliefs.push(format!("{} poses in {} are all the same", track.samples.len(), track.name));
-    }
-    for series in &recording.joints {
-        let names = if series.joints.is_empty() { String::new() } else { format!(" ({})", series.joints.join(", ")) };
-        let count = series.samples.len();
-        recording
-            .beliefs
-            .push(format!("{count} rows of joint values in {}{names}: arm=… makes poses of them", series.name));
-    }
-    for camera in &recording.cameras {
-        recording.beliefs.push(format!("a camera in {}: {}", camera.name, camera.why));
-    }
-    for FoundTarget { target, file, is_id_open } in &recording.targets {
-        let open = if *is_id_open { ", which number of its family is not said" } else { "" };
-        recording.beliefs.push(format!("a target in {file}: {target}{open}"));
-    }
+    let mut recording = reader.recording;
+    let with_points = recording.streams.iter().filter(|stream| stream.points.is_some());
+    let still = recording.still.iter().map(|track| {
+        text!("{count} poses in {name} are all the same", count = track.samples.len(), name = &track.name)
+    });
+    let beliefs = with_points
+        .map(Stream::said)
+        .chain(recording.tracks.iter().map(Track::said))
+        .chain(still)
+        .chain(recording.joints.iter().map(JointSeries::said))
+        .chain(recording.cameras.iter().map(FoundCamera::said))
+        .chain(recording.targets.iter().map(FoundTarget::said));
+    let beliefs: Vec<Text> = beliefs.collect();
+    recording.beliefs.extend(beliefs);
     Ok(recording)
 }

@@ -12,8 +12,8 @@ use handeye_estimate::handeye::Mode;
 use handeye_files::bounds::Bounds;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::TargetSpec;
-use handeye_wording::Text;
 use handeye_wording::text;
+use handeye_wording::{Text, Value};
 
 /// A recording as it was found. Nothing of it is interpreted yet: numbers stand as they were written.
 #[derive(Debug, Clone, Default)]
@@ -23,7 +23,7 @@ pub struct Recording {
     /// What its files may name, and whoever chooses what they mean.
     pub bounds: Bounds,
     /// What is there and why it is taken for that, one sentence each.
-    pub beliefs: Vec<String>,
+    pub beliefs: Vec<Text>,
     /// Streams of images: of one naming and one size in one folder, in natural order.
     pub streams: Vec<Stream>,
     /// Series of poses.
@@ -86,6 +86,39 @@ pub struct Stream {
     pub points: Option<Vec<Option<Vec<[f64; 2]>>>>,
 }
 
+impl Stream {
+    /// What it is, in words.
+    pub fn said(&self) -> Text {
+        let (width, height) = self.size;
+        let size = if self.size == (0, 0) {
+            text!("no file says of which size")
+        } else {
+            text!("of {width}×{height} px", width = width, height = height)
+        };
+        if let Some(points) = &self.points {
+            let views = || points.iter().flatten();
+            return text!(
+                "up to {most} corners of {views} images ({size}) in {name}",
+                most = views().map(Vec::len).max().unwrap_or(0),
+                views = views().count(),
+                size = size,
+                name = &self.name
+            );
+        }
+        let ends = |(first, last): (&ImageFile, &ImageFile)| {
+            text!(", {first} to {last}", first = first.shown(), last = last.shown())
+        };
+        text!(
+            "{count} images {name} {size}{ends}{depth}",
+            count = self.images.len(),
+            name = &self.name,
+            size = size,
+            ends = self.images.first().zip(self.images.last()).map(ends).unwrap_or_default(),
+            depth = if self.is_depth { text!(", 16 bits in one channel: depth") } else { Text::default() }
+        )
+    }
+}
+
 /// An image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageFile {
@@ -137,6 +170,25 @@ impl Track {
     pub fn is_still(&self) -> bool {
         self.samples.windows(2).all(|pair| pair[0].numbers == pair[1].numbers)
     }
+
+    /// What it is, in words.
+    pub fn said(&self) -> Text {
+        let joints = self.samples.iter().filter(|sample| !sample.joints.is_empty()).count();
+        let kind = match self.samples.first().map(|sample| sample.numbers) {
+            Some(Numbers::Angles(_)) | None => text!("six numbers"),
+            Some(Numbers::Quaternion(_)) => text!("translation and quaternion"),
+            Some(Numbers::Matrix(_)) => text!("matrices"),
+        };
+        let with =
+            if joints > 0 { text!(", {count} of them with joint values", count = joints) } else { Text::default() };
+        text!(
+            "{count} poses in {name}: {kind}{with}",
+            count = self.samples.len(),
+            name = &self.name,
+            kind = kind,
+            with = with
+        )
+    }
 }
 
 /// One pose as it was written.
@@ -167,6 +219,19 @@ pub struct JointSeries {
     pub samples: Vec<JointSample>,
 }
 
+impl JointSeries {
+    /// What it is, in words.
+    pub fn said(&self) -> Text {
+        let names = if self.joints.is_empty() { String::new() } else { format!(" ({})", self.joints.join(", ")) };
+        text!(
+            "{count} rows of joint values in {name}{names}: arm=… makes poses of them",
+            count = self.samples.len(),
+            name = &self.name,
+            names = names
+        )
+    }
+}
+
 /// Poses of a robot that moves.
 #[derive(Debug, Clone)]
 pub struct Motion {
@@ -191,6 +256,23 @@ pub struct Clocks {
     pub offset: ClockOffset,
     /// Images that say so.
     pub count: usize,
+}
+
+impl Clocks {
+    /// How far they are apart.
+    pub fn said(&self) -> Text {
+        let (offset_ms, sigma_ms) = (self.offset.offset_s * 1e3, self.offset.sigma_s * 1e3);
+        // Two digits of the standard deviation, and no more of the offset.
+        let decimals = (1.0 - sigma_ms.max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
+        text!(
+            "{offset} ± {sigma} ms are added to the stamps of {count} images {images} to convert them to the clock of {poses}",
+            offset = format!("{offset_ms:.decimals$}"),
+            sigma = format!("{sigma_ms:.decimals$}"),
+            count = self.count,
+            images = &self.images,
+            poses = &self.poses
+        )
+    }
 }
 
 /// The joint values of one pose.
@@ -277,6 +359,14 @@ pub struct FoundTarget {
     pub is_id_open: bool,
 }
 
+impl FoundTarget {
+    /// What it is, in words.
+    pub fn said(&self) -> Text {
+        let open = if self.is_id_open { text!(", which number of its family is not said") } else { Text::default() };
+        text!("a target in {file}: {target}{open}", file = &self.file, target = self.target.said(), open = open)
+    }
+}
+
 /// A camera that a file describes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundCamera {
@@ -286,4 +376,11 @@ pub struct FoundCamera {
     pub intrinsics: Intrinsics,
     /// What kind of file it is.
     pub why: &'static str,
+}
+
+impl FoundCamera {
+    /// What it is, in words.
+    pub fn said(&self) -> Text {
+        text!("a camera in {file}: {why}", file = &self.name, why = Value::phrase(self.why))
+    }
 }

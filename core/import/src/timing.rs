@@ -79,15 +79,9 @@ pub fn timed(
         for (motion, offset) in &found {
             out.tracks.extend(track(motion, stream, offset, &chosen, first_ns));
             let (images, poses) = (stream.name.clone(), motion.name.clone());
-            out.clocks.push(Clocks { images, poses, offset: *offset, count: seen.len() });
-            out.beliefs.push(format!(
-                "{:.3} ± {:.3} ms are added to the stamps of {} images {} to have them by the clock of {}",
-                offset.offset_s * 1e3,
-                offset.sigma_s * 1e3,
-                seen.len(),
-                stream.name,
-                motion.name
-            ));
+            let clocks = Clocks { images, poses, offset: *offset, count: seen.len() };
+            out.beliefs.push(clocks.said());
+            out.clocks.push(clocks);
         }
         let kept = |index: &usize| stream.images[*index].clone();
         out.streams[i].images = chosen.iter().map(kept).collect();

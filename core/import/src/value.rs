@@ -1,4 +1,4 @@
-//! JSON and YAML as one tree, within bounds: files come from strangers.
+//! JSON, YAML and other formats as one tree, within bounds: files come from strangers.
 
 use std::cell::Cell;
 use std::fmt;
@@ -12,9 +12,9 @@ use handeye_wording::foreign;
 use handeye_wording::text;
 
 /// Deepest nesting that is read; recordings have four or five levels.
-const MAX_DEPTH: usize = 32;
+pub(super) const MAX_DEPTH: usize = 32;
 /// Most values in one file: ten thousand poses as 4×4 matrices.
-const MAX_VALUES: usize = 1_000_000;
+pub(super) const MAX_VALUES: usize = 1_000_000;
 
 /// A value of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,55 +130,6 @@ fn refused(error: &serde_json::Error) -> Text {
         || foreign(error),
         |why| text!("{why} at line {line} column {column}", why = why, line = error.line(), column = error.column()),
     )
-}
-
-/// A document of XML, within bounds: its parser compares every attribute of an element with all others of it, and keeps the names
-/// of spaces for every element anew.
-pub(super) fn xml(text: &str) -> Result<roxmltree::Document<'_>, String> {
-    const MOST_ATTRIBUTES: usize = 256;
-    const MOST_SPACES: usize = 64;
-    // A tag ends at the next one at the latest; signs of equality in a text are counted with the tag before it.
-    let attributes = |tag: &str| tag.split('>').next().map_or(0, |inside| inside.matches('=').count());
-    if text.split('<').any(|tag| attributes(tag) > MOST_ATTRIBUTES) {
-        return Err(format!("has an element with more than {MOST_ATTRIBUTES} attributes"));
-    }
-    if text.match_indices("xmlns").nth(MOST_SPACES).is_some() {
-        return Err(format!("names more than {MOST_SPACES} spaces of names"));
-    }
-    let options = roxmltree::ParsingOptions { nodes_limit: MAX_VALUES as u32, ..roxmltree::ParsingOptions::default() };
-    roxmltree::Document::parse_with_options(text, options).map_err(|e| e.to_string())
-}
-
-/// The values of OpenCV's storage in XML; `None` where it is none.
-pub(super) fn opencv_xml(text: &str) -> Option<Value> {
-    let document = xml(text).ok()?;
-    let root = document.root_element();
-    let mut left = MAX_VALUES;
-    root.has_tag_name("opencv_storage").then(|| of_xml(root, 0, &mut left)).flatten()
-}
-
-fn of_xml(node: roxmltree::Node<'_, '_>, depth: usize, left: &mut usize) -> Option<Value> {
-    *left = left.checked_sub(1)?;
-    if depth > MAX_DEPTH {
-        return None;
-    }
-    let inner: Vec<_> = node.children().filter(roxmltree::Node::is_element).collect();
-    if inner.is_empty() {
-        let words: Vec<&str> = node.text().unwrap_or_default().split_whitespace().collect();
-        let value = |word: &&str| number(word).map_or_else(|| Value::Text((*word).to_owned()), Value::Number);
-        *left = left.checked_sub(words.len())?;
-        return Some(match words.as_slice() {
-            [] => Value::Other,
-            [one] => value(one),
-            many => Value::List(many.iter().map(value).collect()),
-        });
-    }
-    let is_list = inner.iter().all(|node| node.has_tag_name("_"));
-    let mut entries = Vec::with_capacity(inner.len());
-    for node in inner {
-        entries.push((node.tag_name().name().to_owned(), of_xml(node, depth + 1, left)?));
-    }
-    Some(if is_list { Value::List(entries.into_iter().map(|(_, value)| value).collect()) } else { Value::Map(entries) })
 }
 
 /// A value of JSON with how many there are in it. What is too much is found while it is read, so that it takes no memory.
@@ -377,18 +328,6 @@ mod tests {
     }
 
     #[test]
-    fn opencv_writes_the_same_in_xml() {
-        let text = "<?xml version=\"1.0\"?>\n<opencv_storage>\n<frameCount>2</frameCount>\n<T1_0 type_id=\"opencv-matrix\">\n  \
-                    <rows>2</rows>\n<cols>2</cols>\n<dt>d</dt>\n  <data>\n    1. 2.5e-01 -3.\n    .5</data></T1_0>\n<list><_>\n  1 \
-                    2</_><_>3 4</_></list></opencv_storage>";
-        let value = opencv_xml(text).expect("read");
-        assert_eq!(value.get("T1_0").expect("there").numbers(16), Some(vec![1.0, 0.25, -3.0, 0.5]));
-        assert_eq!(value.get("frameCount").and_then(Value::whole), Some(2));
-        assert_eq!(value.get("list").map(|list| list.list().len()), Some(2));
-        assert_eq!(opencv_xml("<root><a>1</a></root>"), None);
-    }
-
-    #[test]
     fn a_record_to_a_line_is_a_list() {
         let records = json("{\"a\": 1}\n{\"a\": 2}\n").expect("read");
         assert_eq!(records.list().len(), 2);
@@ -411,11 +350,6 @@ mod tests {
     /// Were any of these read in time that grows with the square of its length, this test would take hours.
     #[test]
     fn what_is_written_to_take_for_ever_is_refused_at_once() {
-        let attributes = (0..1_000_000).map(|i| format!(" a{i}=\"\"")).collect::<Vec<_>>().concat();
-        assert!(xml(&format!("<opencv_storage{attributes}/>")).is_err_and(|why| why.contains("attributes")));
-        let spaces = (0..100_000).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect::<Vec<_>>().concat();
-        assert!(xml(&spaces).is_err_and(|why| why.contains("spaces of names")));
-        assert!(xml(&format!("<a>{}</a>", "<b/>".repeat(2 * MAX_VALUES))).is_err());
         for text in [format!("[{}1]", "1,".repeat(2 * MAX_VALUES)), "1 ".repeat(2 * MAX_VALUES)] {
             assert!(json(&text).is_err_and(|why| why.to_string().contains("more than")), "{}", &text[..20]);
         }

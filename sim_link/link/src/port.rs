@@ -163,7 +163,12 @@ pub trait ControlPort: Send {
     }
 
     /// Goes on as another client of the same server: what that may still keep for this one would only be in the way.
-    fn renew(&mut self) {}
+    ///
+    /// # Errors
+    /// When nothing answers.
+    fn renew(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
 
     /// Takes the pose that a person reads off the pendant; `None` once the robot has been moved on.
     ///
@@ -217,7 +222,12 @@ pub enum Room {
 /// What moves the arm.
 pub trait MotionPort: Send {
     /// As [`ControlPort::renew`].
-    fn renew(&mut self) {}
+    ///
+    /// # Errors
+    /// As [`ControlPort::renew`].
+    fn renew(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
 
     /// From now on simulated time advances by [`Self::pass`] and the motions of this connection alone, or by itself again.
     /// Time that is not simulated goes on.
@@ -346,7 +356,12 @@ pub trait CameraPort: Send {
     fn newest(&mut self, seen_s: Option<f64>) -> Result<Newest, PortError>;
 
     /// As [`ControlPort::renew`].
-    fn renew(&mut self) {}
+    ///
+    /// # Errors
+    /// As [`ControlPort::renew`].
+    fn renew(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
 
     /// Depths \[m\] that the sensor can measure; it reports the far one where nothing reflects.
     fn depth_limits_m(&self) -> [f32; 2];

@@ -9,8 +9,7 @@ use egui::{
     Align, Button, ColorImage, Id, Image, Layout, RichText, ScrollArea, TextEdit, TextureHandle, TextureOptions, Ui,
     Vec2, WidgetInfo, WidgetType,
 };
-use handeye_import::{Hypothesis, Numbers, Source, Stream, Track, Verdict};
-use handeye_wording::Value;
+use handeye_import::{Hypothesis, Source, Stream, Verdict};
 use image::RgbImage;
 
 use crate::style::parts;
@@ -59,21 +58,8 @@ pub fn import_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     let recording = &found.recording;
     parts::section_ui(ui, tr!(language, "What is there"));
-    let streams = recording.streams.iter().map(of_stream);
-    let tracks = recording.tracks.iter().map(of_track);
-    let joints = recording.joints.iter().map(|series| {
-        text!("{count} {count|row|rows} of joint values in {name}", count = series.samples.len(), name = &series.name)
-    });
-    let cameras = recording
-        .cameras
-        .iter()
-        .map(|camera| text!("A camera in {file}: {why}", file = &camera.name, why = Value::phrase(camera.why)));
-    let targets = recording
-        .targets
-        .iter()
-        .map(|target| text!("A target in {file}: {target}", file = &target.file, target = target.target.said()));
-    for line in streams.chain(tracks).chain(joints).chain(cameras).chain(targets) {
-        ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
+    for belief in &recording.beliefs {
+        ui.label(RichText::new(belief.say(language)).color(Palette::of(ui).text));
     }
     if let Some(looked) = found.looked.as_deref() {
         for (stream, seen, images) in &looked.seen {
@@ -85,9 +71,6 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
             );
             ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
         }
-        for clocks in &recording.clocks {
-            ui.label(RichText::new(understand::clocks_said(clocks).say(language)).color(Palette::of(ui).text));
-        }
         for note in &looked.notes {
             parts::hint_ui(ui, &note.say(language));
         }
@@ -95,27 +78,6 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     for warning in &recording.warnings {
         parts::hint_ui(ui, &warning.say(language));
     }
-}
-
-fn of_stream(stream: &Stream) -> Text {
-    let Stream { name, images, size: (width, height), is_depth, points } = stream;
-    let line = if points.is_some() {
-        return text!("corners of {count} {count|image|images} in {name}", count = images.len(), name = name);
-    } else if *is_depth {
-        text!("{count} depth {count|image|images} {name} of {width} × {height} px", count = images.len(), name = name)
-    } else {
-        text!("{count} {count|image|images} {name} of {width} × {height} px", count = images.len(), name = name)
-    };
-    line.with("width", width).with("height", height)
-}
-
-fn of_track(track: &Track) -> Text {
-    let kind = match track.samples.first().map(|sample| sample.numbers) {
-        Some(Numbers::Quaternion(_)) => text!("position and quaternion"),
-        Some(Numbers::Matrix(_)) => text!("matrices"),
-        Some(Numbers::Angles(_)) | None => text!("position and three angles"),
-    };
-    text!("{count} {count|pose|poses} in {name}: {kind}", count = track.samples.len(), name = &track.name, kind = kind)
 }
 
 /// The first images of what is looked at, with the pose that belongs to each by the hypothesis that is chosen.
@@ -273,6 +235,8 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         if found.has_images() {
             parts::hint_ui(ui, tr!(language, "The camera alone can be calibrated with these images."));
         }
+        let formats = Text::list(understand::formats_said());
+        parts::hint_ui(ui, &text!("Formats that are read: {formats}", formats = formats).say(language));
         return;
     };
     let (tone, verdict) = match &judgement.verdict {

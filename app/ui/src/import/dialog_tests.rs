@@ -6,8 +6,8 @@ use egui_kittest::kittest::Queryable as _;
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::progress::CancelToken;
 use handeye_import::{
-    self as import, AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Pairing, Reading, Recording,
-    Role as TrackRole, RotationForm, Sample, Settings, Sights, Stated,
+    self as import, AngleUnit, Direction, Fit, ImageFile, Judgement, LengthUnit, Numbers, Pairing, Reading, Recording,
+    Role as TrackRole, RotationForm, Sample, Settings, Sights, Stated, Track,
 };
 use nalgebra::{Isometry3, Vector3};
 
@@ -76,6 +76,7 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
     };
     let recording = Recording {
         root: "/data/tuesday".into(),
+        beliefs: vec![stream.said(), track.said()],
         streams: vec![stream],
         tracks: vec![track],
         warnings: vec![Text::verbatim("image7.png is a copy of image3.png, byte by byte")],
@@ -128,8 +129,8 @@ fn two() -> Found {
 #[test]
 fn what_the_data_do_not_tell_waits_for_a_person() {
     let mut pane = driven(Some(two()), None);
-    assert!(pane.sees("4 images image#.png of 640 × 480 px"));
-    assert!(pane.sees("4 poses in poses.txt: position and quaternion"));
+    assert!(pane.sees("4 images image#.png of 640×480 px, image0.png to image3.png"));
+    assert!(pane.sees("4 poses in poses.txt: translation and quaternion"));
     assert!(pane.sees("image7.png is a copy of image3.png, byte by byte"));
     assert!(!pane.is_enabled("Import"), "nothing is taken in silence");
     let second = "2.  0.35 mm  0.057°  eye_to_hand  tip_from_base";

@@ -7,8 +7,8 @@ use handeye_estimate::CameraKnowledge;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::{AprilTag, TargetSpec};
 use handeye_import::{
-    self as import, Clocks, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights,
-    Source, Verdict, write,
+    self as import, FoundCamera, Hypothesis, ImportError, Judgement, Recording, Role, Settings, Sight, Sights, Source,
+    Verdict, write,
 };
 
 use crate::observe::{self, ObserveError, Progress};
@@ -84,19 +84,12 @@ impl Looked {
     }
 }
 
-/// How far clocks are apart.
-pub fn clocks_said(clocks: &Clocks) -> Text {
-    let (offset_ms, sigma_ms) = (clocks.offset.offset_s * 1e3, clocks.offset.sigma_s * 1e3);
-    // Two digits of the standard deviation, and no more of the offset.
-    let decimals = (1.0 - sigma_ms.max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
-    text!(
-        "{offset} ± {sigma} ms are added to the stamps of {count} images {images} to convert them to the clock of {poses}",
-        offset = format!("{offset_ms:.decimals$}"),
-        sigma = format!("{sigma_ms:.decimals$}"),
-        count = clocks.count,
-        images = &clocks.images,
-        poses = &clocks.poses
-    )
+/// What is read: a line to a format.
+pub fn formats_said() -> Vec<Text> {
+    let line = |(name, endings): (Text, String)| {
+        if endings.is_empty() { name } else { text!("{name} ({endings})", name = name, endings = endings) }
+    };
+    import::formats().into_iter().map(line).collect()
 }
 
 /// That not everything was tried, and what to do.

@@ -4,8 +4,12 @@
 use std::collections::HashSet;
 
 use super::single::is_call;
-use super::tree::is_image_name;
+use super::tree::{self, is_image_name};
+use super::{File, Format};
+use crate::reader::Reader;
 use crate::value::{Value, number};
+use handeye_wording::Text;
+use handeye_wording::text;
 
 /// Most numbers and names of one text.
 const MOST: usize = 1_000_000;
@@ -14,9 +18,27 @@ const MOST_OF_A_FIELD: usize = 64;
 /// Words that a name may have.
 const MOST_WORDS: usize = 8;
 
+pub(super) struct Blocks;
+
+impl Format for Blocks {
+    fn name(&self) -> Text {
+        text!("numbers behind names in a text")
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.text().is_some()
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let value = file.text().and_then(document);
+        reader.recording.tracks.extend(value.iter().flat_map(|value| tree::series(value, &file.name())));
+        true
+    }
+}
+
 /// The fields of a text, or of every record that begins where a name stands again; `None` where no numbers have names.
-pub(crate) fn document(text: &str) -> Option<Value> {
-    let mut reader = Reader::default();
+pub(super) fn document(text: &str) -> Option<Value> {
+    let mut reader = Records::default();
     let is_between = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')' | '{' | '}' | '|');
     let mut read = 0;
     for line in text.lines() {
@@ -40,7 +62,7 @@ pub(crate) fn document(text: &str) -> Option<Value> {
 }
 
 #[derive(Default)]
-struct Reader {
+struct Records {
     records: Vec<Value>,
     /// Fields of the record that is being read, and their names.
     fields: Vec<(String, Value)>,
@@ -56,7 +78,7 @@ struct Reader {
     may_count: bool,
 }
 
-impl Reader {
+impl Records {
     fn word(&mut self, word: &str, depth: usize) {
         if !word.chars().any(char::is_alphanumeric) || is_call(word) {
             return;
@@ -163,7 +185,6 @@ impl Reader {
 mod tests {
     use super::*;
     use crate::conventions::RotationForm;
-    use crate::formats::tree;
     use crate::recording::{Numbers, Role, Track};
 
     fn read(file: &str, text: &str) -> Vec<Track> {

@@ -1,7 +1,11 @@
 //! What settings of somebody's script say of a board. Names of such fields agree about nothing: whether inner corners or squares
 //! are counted, and in what lengths are, is left to a person, who is told what to give.
 
+use super::{File, Format};
+use crate::reader::Reader;
 use crate::value::Value;
+use handeye_wording::Text;
+use handeye_wording::text;
 
 /// Rows or columns of a board; images are larger.
 const MOST: f64 = 60.0;
@@ -39,8 +43,31 @@ const ROWS: [&str; 12] = [
     "height_corners",
 ];
 
+pub(super) struct BoardWords;
+
+impl Format for BoardWords {
+    fn name(&self) -> Text {
+        text!("a board in settings")
+    }
+
+    fn is_of_poses(&self) -> bool {
+        false
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.value().is_some()
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        if reader.recording.targets.is_empty() {
+            reader.recording.beliefs.extend(file.value().and_then(|value| told(value, &file.name())));
+        }
+        false
+    }
+}
+
 /// A sentence with the option to give, where a document names rows, columns and a square.
-pub(crate) fn told(value: &Value, file: &str) -> Option<String> {
+fn told(value: &Value, file: &str) -> Option<Text> {
     let mut found = Found::default();
     found.look(value, 0);
     let (columns, rows) = found.count?;
@@ -51,9 +78,15 @@ pub(crate) fn told(value: &Value, file: &str) -> Option<String> {
     let square_mm = if is_metres { square * 1e3 } else { square };
     // Three digits after the point are micrometres.
     let square_mm = (square_mm * 1e3).round() / 1e3;
-    Some(format!(
+    Some(text!(
         "{file} names a board of {columns} × {rows} and {name} = {square}: if those are inner corners, and that is {square_mm} mm, \
-         give --target {columns}x{rows}x{square_mm}"
+         give --target {columns}x{rows}x{square_mm}",
+        file = file,
+        columns = columns,
+        rows = rows,
+        name = name,
+        square = square,
+        square_mm = square_mm
     ))
 }
 
@@ -110,13 +143,13 @@ mod tests {
 
     #[test]
     fn the_option_to_give_is_told_however_the_fields_are_called() {
-        let of_json = |text: &str| told(&json(text).expect("JSON"), "config.json");
+        let of_json = |text: &str| told(&json(text).expect("JSON"), "config.json").map(|said| said.to_string());
         let said = of_json(r#"{"camera": {"chessboard_size": [9, 6], "square_size_mm": 25}}"#).expect("a board");
         assert!(said.contains("give --target 9x6x25") && said.contains("if those are inner corners"), "{said}");
         let said = of_json(r#"{"board": {"cols": 11, "rows": 8, "square_length": 0.02}}"#).expect("a board");
         assert!(said.ends_with("--target 11x8x20"), "{said}");
         let documents = yaml("board_squaresX: 5\nboard_squaresY: 7\nsquare_size_m: 0.0365\n").expect("YAML");
-        let said = told(&documents[0], "board.yaml").expect("a board");
+        let said = told(&documents[0], "board.yaml").expect("a board").to_string();
         assert!(said.ends_with("--target 5x7x36.5"), "{said}");
         // Sizes of images and boards without a square are none.
         assert_eq!(of_json(r#"{"board_image": [640, 480], "square_size": 25}"#), None);

@@ -4,8 +4,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::tree::{LEAST_POSES, is_image_name};
+use super::tree::{LEAST_POSES, is_image_name, track_name};
+use super::{File, Format};
 use crate::folder;
+use crate::reader::Reader;
 use crate::recording::{FoundTarget, ImageFile, Stream};
 use crate::value::Value;
 use handeye_geometry::targets::observation::Corner;
@@ -25,6 +27,26 @@ const MOST_LISTS: usize = 8;
 
 type Point = [f64; 2];
 
+pub(super) struct Corners;
+
+impl Format for Corners {
+    fn name(&self) -> Text {
+        text!("corners instead of images")
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.value().is_some()
+    }
+
+    /// They are no poses, which other formats may find in the same files.
+    fn read_together(&self, files: &[File], reader: &mut Reader<'_>) -> bool {
+        let (streams, targets) = streams(files);
+        reader.recording.streams.extend(streams);
+        reader.recording.targets.extend(targets);
+        false
+    }
+}
+
 /// What one image has of each list of points, by where it stands.
 struct View<'a> {
     file: PathBuf,
@@ -42,19 +64,19 @@ impl<'a> View<'a> {
 }
 
 /// The streams of points in documents, and the boards that they describe.
-pub(crate) fn streams(read: &[(PathBuf, Option<u64>, Value)]) -> (Vec<Stream>, Vec<FoundTarget>) {
+fn streams(files: &[File]) -> (Vec<Stream>, Vec<FoundTarget>) {
+    let documents = files.iter().filter_map(|file| Some((file, file.value()?)));
     let views: Vec<View<'_>> =
-        read.iter().map(|(file, number, value)| View::new(file.clone(), *number, value)).collect();
+        documents.map(|(file, value)| View::new(file.path.clone(), file.number, value)).collect();
     let of_files = views.iter().filter(|view| !view.lists.is_empty()).count();
     if of_files >= LEAST_POSES {
-        let name = folder::shown(read.iter().map(|(file, ..)| file.as_path()));
+        let name = folder::shown(files.iter().map(|file| file.path.as_path()));
         return of_views(&name, &views, None);
     }
     let (mut streams, mut targets) = (Vec::new(), Vec::new());
-    for (file, _, value) in read {
-        let Some((path, elements)) = elements(value, "", 0) else { continue };
-        let name = format!("{}{}{path}", file.display(), if path.is_empty() { "" } else { ":" });
-        let (more, boards) = of_views(&name, &elements, Some(value));
+    for file in files {
+        let Some((path, elements)) = file.value().and_then(|value| elements(value, "", 0)) else { continue };
+        let (more, boards) = of_views(&track_name(&file.name(), &path), &elements, file.value());
         streams.extend(more);
         targets.extend(boards);
     }

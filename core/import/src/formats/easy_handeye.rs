@@ -3,14 +3,65 @@
 
 use std::path::Path;
 
-use super::tree;
+use super::{Encoding, File, Format, tree};
 use crate::conventions::{Direction, LengthUnit, RotationForm};
+use crate::folder;
+use crate::nothing::Likely;
+use crate::reader::Reader;
 use crate::recording::{FoundMode, Known, Role, Track};
 use crate::value::Value;
 use handeye_estimate::handeye::Mode;
+use handeye_wording::Text;
+use handeye_wording::text;
+
+pub(super) struct EasyHandeye;
+
+impl Format for EasyHandeye {
+    fn name(&self) -> Text {
+        Text::verbatim("easy_handeye2")
+    }
+
+    fn endings(&self) -> &'static [(&'static str, Encoding)] {
+        &[("samples", Encoding::Yaml), ("calib", Encoding::Yaml)]
+    }
+
+    fn is_beside(&self, file: &Path, named: &Path) -> bool {
+        is_calib(file) && file.file_stem() == named.file_stem()
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.value().is_some_and(|value| value.get("samples").or(value.get("parameters")).is_some())
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let (Some(value), name) = (file.value(), file.name()) else { return false };
+        if let Some(mode) = mode(value, &file.path) {
+            // Of several recordings beside each other each has its own.
+            let beside = reader.root.join(file.path.with_extension("samples"));
+            if !is_calib(&file.path) || beside.is_file() {
+                reader.mode(mode);
+            }
+        }
+        let tracks = samples(value, &name);
+        let is_so = tracks.is_some();
+        if is_so {
+            reader.recording.beliefs.push(text!("{file} has samples of easy_handeye2", file = name));
+        }
+        reader.recording.tracks.extend(tracks.unwrap_or_default());
+        is_so
+    }
+
+    fn instead(&self, file: &File, _reader: &Reader<'_>) -> Option<(Likely, Text)> {
+        file.value().filter(|_| !is_calib(&file.path)).map(tree::instead)
+    }
+}
+
+fn is_calib(file: &Path) -> bool {
+    folder::ending(file) == "calib"
+}
 
 /// The series of a file of samples; `None` when it is none.
-pub(crate) fn samples(value: &Value, file: &str) -> Option<Vec<Track>> {
+fn samples(value: &Value, file: &str) -> Option<Vec<Track>> {
     let first = value.get("samples")?.list().first()?;
     first.get("robot")?;
     first.get("tracking").or_else(|| first.get("optical"))?;
@@ -36,7 +87,7 @@ pub(crate) fn samples(value: &Value, file: &str) -> Option<Vec<Track>> {
 }
 
 /// Where the camera sits by a `.calib` of easy_handeye2, or a result of easy_handeye.
-pub(crate) fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
+fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
     let parameters = value.get("parameters")?;
     let by = |key: &'static str, value: Mode| FoundMode { value, key, file: file.display().to_string() };
     if let Some(kind) = parameters.get("calibration_type").and_then(Value::text) {

@@ -4,19 +4,54 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::tree;
+use super::{File, Format, tree};
 use crate::conventions::{Direction, LengthUnit};
-use crate::recording::{FoundMode, Known, Role, Sample, Track};
-use crate::value::Value;
+use crate::folder;
+use crate::reader::Reader;
+use crate::recording::{FoundMode, FoundTarget, Known, Role, Sample, Track};
+use crate::value::{self, Value};
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::targets::{Charuco, Dictionary, Grid, TargetSpec};
+use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Most pairs that are read.
 const MOST_PAIRS: usize = 10_000;
 
+pub(super) struct IndustrialCalibration;
+
+impl Format for IndustrialCalibration {
+    fn name(&self) -> Text {
+        Text::verbatim("industrial_calibration, robot_cal_tools")
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.value().is_some()
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let (Some(value), name) = (file.value(), file.name()) else { return false };
+        if let Some(mode) = mode(value, &file.path) {
+            reader.mode(mode);
+        }
+        let found = target(value).map(|target| FoundTarget { target, file: name.clone(), is_id_open: false });
+        reader.recording.targets.extend(found);
+        let document = |path: &Path| {
+            let path = reader.root.join(path);
+            let may_be = !reader.budget.is_spent() && reader.recording.bounds.has(&path);
+            let text = may_be.then(|| folder::text(&path).ok()).flatten()?;
+            value::yaml(&text).ok()?.into_iter().next()
+        };
+        let Some(track) = pairs(value, &file.path, document) else { return false };
+        let belief = text!("{file} lists poses and images as industrial_calibration does", file = name);
+        reader.recording.beliefs.push(belief);
+        reader.recording.tracks.push(track);
+        true
+    }
+}
+
 /// The series that a list of pairs names; `None` when the document is none. `read` gives the document in a file beside it.
-pub(crate) fn pairs(value: &Value, file: &Path, read: impl Fn(&Path) -> Option<Value>) -> Option<Track> {
+fn pairs(value: &Value, file: &Path, read: impl Fn(&Path) -> Option<Value>) -> Option<Track> {
     let list = value.get("data").unwrap_or(value).list();
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut samples = Vec::new();
@@ -53,14 +88,14 @@ pub(crate) fn pairs(value: &Value, file: &Path, read: impl Fn(&Path) -> Option<V
 }
 
 /// Where the camera sits, where the file says it.
-pub(crate) fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
+fn mode(value: &Value, file: &Path) -> Option<FoundMode> {
     let key = "static_camera";
     let mode = if value.get(key)?.flag()? { Mode::EyeToHand } else { Mode::EyeInHand };
     Some(FoundMode { value: mode, key, file: file.display().to_string() })
 }
 
 /// The target of its `target_finder`.
-pub(crate) fn target(value: &Value) -> Option<TargetSpec> {
+fn target(value: &Value) -> Option<TargetSpec> {
     let finder = value.get("target_finder").unwrap_or(value);
     let kind = finder.get("type").and_then(Value::text)?.to_lowercase();
     let whole = |key: &str| finder.get(key).and_then(Value::whole).map(|n| n as usize);

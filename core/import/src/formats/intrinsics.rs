@@ -1,12 +1,12 @@
-//! Cameras that others have calibrated: ROS `camera_info` (`ost.yaml`), Kalibr's camchain, mrcal's `.cameramodel`, OpenCV's
-//! files, and JSON or YAML with a matrix and its coefficients.
+//! Cameras that others have calibrated: ROS `camera_info` (`ost.yaml`), Kalibr's camchain, OpenCV's files, and JSON or YAML with a
+//! matrix and its coefficients.
 
 use crate::recording::FoundCamera;
 use crate::value::Value;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 
 /// The cameras in a document.
-pub(crate) fn of_document(value: &Value, file: &str) -> Vec<FoundCamera> {
+pub(super) fn of_document(value: &Value, file: &str) -> Vec<FoundCamera> {
     let kalibr = kalibr(value, file);
     if !kalibr.is_empty() {
         return kalibr;
@@ -21,7 +21,7 @@ pub(crate) fn of_document(value: &Value, file: &str) -> Vec<FoundCamera> {
     found.or_else(nested).into_iter().collect()
 }
 
-fn camera(
+pub(super) fn camera(
     file: &str,
     why: &'static str,
     four: [f64; 4],
@@ -38,7 +38,7 @@ fn camera(
     })
 }
 
-fn size_of(value: &Value) -> Option<(u32, u32)> {
+pub(super) fn size_of(value: &Value) -> Option<(u32, u32)> {
     let whole = |keys: &[&str]| keys.iter().find_map(|key| value.get(key)).and_then(Value::whole).map(|n| n as u32);
     let sides = (whole(&["image_width", "width", "w"]), whole(&["image_height", "height", "h"]));
     if let (Some(width), Some(height)) = sides {
@@ -52,7 +52,7 @@ fn size_of(value: &Value) -> Option<(u32, u32)> {
 }
 
 /// Coefficients in OpenCV's order: none, 4, 5 or 8 of them.
-fn brown(k: &[f64]) -> Option<Distortion> {
+pub(super) fn brown(k: &[f64]) -> Option<Distortion> {
     if k.iter().any(|v| !v.is_finite()) {
         return None;
     }
@@ -145,45 +145,10 @@ fn kalibr(value: &Value, file: &str) -> Vec<FoundCamera> {
     entries.iter().filter(|(key, _)| key.starts_with("cam")).take(16).filter_map(one).collect()
 }
 
-/// mrcal's `.cameramodel`: a Python dictionary, which is YAML but for the comments and trailing commas.
-pub(crate) fn mrcal(text: &str, file: &str) -> Option<FoundCamera> {
-    let value = crate::value::yaml(text).ok()?.into_iter().next()?;
-    let model = value.get("lensmodel")?.text()?.to_owned();
-    let numbers = value.get("intrinsics")?.numbers(16)?;
-    let (four, k) = numbers.split_first_chunk::<4>()?;
-    let distortion = match (&*model, k.len()) {
-        ("LENSMODEL_PINHOLE", 0) => Distortion::None,
-        ("LENSMODEL_OPENCV4", 4) | ("LENSMODEL_OPENCV5", 5) | ("LENSMODEL_OPENCV8", 8) => brown(k)?,
-        _ => return None,
-    };
-    camera(file, "a camera model of mrcal", *four, size_of(&value), distortion)
-}
-
-/// The text of `ost.yaml` in the TAR that ROS' camera calibrator writes; `None` when there is none. Only files that lie in it
-/// uncompressed are read.
-pub(crate) fn ost_in_tar(bytes: &[u8]) -> Option<String> {
-    const BLOCK: usize = 512;
-    let mut at = 0;
-    while let Some(header) = bytes.get(at..at + BLOCK) {
-        if header[0] == 0 {
-            return None;
-        }
-        let text = |range: std::ops::Range<usize>| {
-            String::from_utf8_lossy(&header[range]).trim_matches(['\0', ' ']).to_owned()
-        };
-        let size = usize::from_str_radix(&text(124..136), 8).ok()?;
-        let start = at + BLOCK;
-        if text(0..100).ends_with("ost.yaml") {
-            return bytes.get(start..start.checked_add(size)?).map(|b| String::from_utf8_lossy(b).into_owned());
-        }
-        at = start.checked_add(size.div_ceil(BLOCK).checked_mul(BLOCK)?)?;
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::cameras::mrcal;
     use crate::value::{json, yaml};
 
     fn only(found: &[FoundCamera]) -> Intrinsics {
@@ -217,23 +182,5 @@ mod tests {
         }
         assert_eq!(only(&of_document(&json(own).expect("JSON"), "f")), want);
         assert_eq!(only(mrcal(mrcal_text, "f").as_slice()), want);
-    }
-
-    #[test]
-    fn the_camera_of_a_tar_is_found_behind_other_files_and_a_cut_tar_is_none() {
-        let mut tar = Vec::new();
-        for (name, content) in [("left-0000.png", "x".repeat(700)), ("ost.yaml", "image_width: 3\n".to_owned())] {
-            let mut header = [0u8; 512];
-            header[..name.len()].copy_from_slice(name.as_bytes());
-            let size = format!("{:011o}\0", content.len());
-            header[124..136].copy_from_slice(size.as_bytes());
-            tar.extend_from_slice(&header);
-            tar.extend_from_slice(content.as_bytes());
-            tar.resize(tar.len().div_ceil(512) * 512, 0);
-        }
-        assert_eq!(ost_in_tar(&tar).as_deref(), Some("image_width: 3\n"));
-        for cut in 0..tar.len() {
-            let _cut = ost_in_tar(&tar[..cut]);
-        }
     }
 }

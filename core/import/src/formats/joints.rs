@@ -15,7 +15,7 @@ const MOST_JOINTS: usize = 64;
 const ROW: std::ops::RangeInclusive<usize> = 4..=16;
 
 /// The joint values of a document, which may be none.
-pub(crate) fn of_document(value: &Value, file: &str) -> Option<JointSeries> {
+pub(super) fn of_document(value: &Value, file: &str) -> Option<JointSeries> {
     moveit(value, file).or_else(|| listed(value, file))
 }
 

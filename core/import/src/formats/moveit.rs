@@ -1,10 +1,32 @@
 //! MoveIt calibration: samples of `effector_wrt_world` and `object_wrt_sensor`, or groups of both as lists.
 
+use super::{File, Format};
 use crate::conventions::{Direction, LengthUnit};
-use crate::recording::{Known, Role, Track};
+use crate::recording::{Known, Recording, Role, Track};
+use handeye_wording::Text;
+use handeye_wording::text;
+
+pub(super) struct MoveIt;
+
+impl Format for MoveIt {
+    fn name(&self) -> Text {
+        text!("MoveIt calibration")
+    }
+
+    /// Its files are documents of which only the names of the series say what they are.
+    fn sniff(&self, _file: &File) -> bool {
+        false
+    }
+
+    fn finish(&self, recording: &mut Recording) {
+        if know(&mut recording.tracks) {
+            recording.beliefs.push(text!("the poses are samples of MoveIt calibration, by their names"));
+        }
+    }
+}
 
 /// Says what is known of series that have MoveIt's names or its form; whether there are any.
-pub(crate) fn know(tracks: &mut [Track]) -> bool {
+fn know(tracks: &mut [Track]) -> bool {
     let ends = |track: &Track, with: &str| track.name.ends_with(with);
     let named =
         tracks.iter().any(|t| ends(t, "effector_wrt_world")) && tracks.iter().any(|t| ends(t, "object_wrt_sensor"));

@@ -5,7 +5,10 @@ use std::io::{Cursor, Read as _};
 use std::sync::Arc;
 
 use super::parts::{self, Part};
-use super::tree;
+use super::{Encoding, File, Format, tree};
+use crate::folder;
+use crate::nothing::Likely;
+use crate::reader::Reader;
 use crate::recording::{Sample, Stated, Track};
 use crate::value::Value;
 use handeye_files::budget::Budget;
@@ -18,6 +21,37 @@ const MOST_ARRAYS: usize = 64;
 const MOST_NUMBERS: usize = 4_000_000;
 /// Numbers of an array that may be one pose, joint values or a camera.
 const MOST_OF_A_POSE: usize = 64;
+
+pub(super) struct NumPy;
+
+impl Format for NumPy {
+    fn name(&self) -> Text {
+        Text::verbatim("NumPy")
+    }
+
+    fn endings(&self) -> &'static [(&'static str, Encoding)] {
+        &[("npz", Encoding::Own), ("npy", Encoding::Own)]
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        match folder::bytes(&reader.root.join(&file.path)) {
+            Err(error) => reader.recording.warnings.push(error.into()),
+            Ok(bytes) => match read(&file.name(), &bytes, reader.budget) {
+                Err(why) => reader.not_used(&file.path, why),
+                Ok((tracks, warnings)) => {
+                    reader.recording.tracks.extend(tracks);
+                    reader.recording.warnings.extend(warnings);
+                }
+            },
+        }
+        true
+    }
+
+    fn instead(&self, file: &File, reader: &Reader<'_>) -> Option<(Likely, Text)> {
+        let bytes = folder::bytes(&reader.root.join(&file.path)).ok()?;
+        document(&bytes, reader.budget).as_ref().map(tree::instead)
+    }
+}
 
 /// An array.
 struct Array {
@@ -32,13 +66,13 @@ enum Content {
 }
 
 /// The series of poses in a file, and what of it was not read.
-pub(crate) fn read(file: &str, bytes: &[u8], budget: &Budget<'_>) -> Result<(Vec<Track>, Vec<Text>), Text> {
+fn read(file: &str, bytes: &[u8], budget: &Budget<'_>) -> Result<(Vec<Track>, Vec<Text>), Text> {
     let (arrays, warnings) = arrays(file, bytes, budget)?;
     Ok((series(file, &arrays), warnings))
 }
 
 /// The arrays of a small file as fields by their names; an array that is alone without a name is the whole of it.
-pub(crate) fn document(bytes: &[u8], budget: &Budget<'_>) -> Option<Value> {
+pub(super) fn document(bytes: &[u8], budget: &Budget<'_>) -> Option<Value> {
     let (arrays, _) = arrays("", bytes, budget).ok()?;
     let mut entries: Vec<(String, Value)> = Vec::new();
     for array in arrays {

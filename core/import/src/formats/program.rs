@@ -3,14 +3,41 @@
 
 use std::sync::Arc;
 
-use super::tree;
+use super::Encoding::{self, Own};
+use super::{File, Format, tree};
 use crate::conventions::{AngleUnit, Euler, LengthUnit, RotationForm, is_unit};
+use crate::reader::Reader;
 use crate::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::value::number;
+use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Poses of one file that are looked at.
 const MOST_POSES: usize = 100_000;
+
+pub(super) struct Programs;
+
+impl Format for Programs {
+    fn name(&self) -> Text {
+        text!("robot programs")
+    }
+
+    fn endings(&self) -> &'static [(&'static str, Encoding)] {
+        &[("script", Own), ("src", Own), ("mod", Own), ("ls", Own)]
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.text().is_some() || self.has_ending(file)
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let own = if file.text().is_none() { reader.text(&file.path) } else { None };
+        let track = file.text().or(own.as_deref()).and_then(|text| read(&file.name(), text));
+        let is_so = track.is_some();
+        reader.recording.tracks.extend(track);
+        is_so
+    }
+}
 
 /// Languages, with what they say of their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,7 +115,7 @@ fn by_keys(rest: &str, keys: [&str; 6], is_so: impl Fn(&str) -> bool) -> Option<
 }
 
 /// The series of poses of a program; `None` when it is none.
-pub(crate) fn read(file: &str, text: &str) -> Option<Track> {
+fn read(file: &str, text: &str) -> Option<Track> {
     Language::ALL.into_iter().find_map(|language| {
         let begins: &[char] = if language == Language::UrScript { &['p'] } else { &['{', '['] };
         let mut samples = Vec::new();

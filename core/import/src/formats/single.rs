@@ -1,7 +1,7 @@
 //! A pose to a file that has numbers and no names, so that nothing else tells what they are.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use super::table::bare::{self, Row};
@@ -10,16 +10,11 @@ use crate::value::number;
 use handeye_wording::Text;
 
 /// No pose with joint values beside it has as many numbers.
-pub(crate) const MOST_NUMBERS: usize = 32;
+pub(super) const MOST_NUMBERS: usize = 32;
 
-/// The series that files of one naming are, in every order of their numbers; none where most of them have other words or no
-/// common number of numbers.
-pub(crate) fn texts(name: &str, role: Role, texts: &[(PathBuf, Option<u64>, String)]) -> Vec<Track> {
-    tracks(name, role, texts.iter().map(|(file, number, text)| (file.as_path(), *number, numbers(text))))
-}
-
-/// The same of files of which the numbers are known, where they have nothing else.
-pub(crate) fn tracks<'a>(
+/// The series that files of one naming are, of which the numbers are known where they have nothing else, in every order of the numbers;
+/// none where most of them have other words or no common number of numbers.
+pub(super) fn tracks<'a>(
     name: &str,
     role: Role,
     files: impl ExactSizeIterator<Item = (&'a Path, Option<u64>, Option<Vec<f64>>)>,
@@ -46,13 +41,13 @@ pub(crate) fn tracks<'a>(
 }
 
 /// Where a pose stands that has a file for itself.
-pub(crate) fn place(file: &Path) -> Text {
+pub(super) fn place(file: &Path) -> Text {
     let name = file.display().to_string();
     Text::verbatim(name)
 }
 
 /// The numbers of a text that has nothing else, whatever stands between them; brackets and calls of Python's are nothing.
-pub(crate) fn numbers(text: &str) -> Option<Vec<f64>> {
+pub(super) fn numbers(text: &str) -> Option<Vec<f64>> {
     let is_sign = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')');
     let words = text.split(is_sign).filter(|word| !word.is_empty() && !is_call(word));
     words.take(MOST_NUMBERS + 1).map(number).collect::<Option<Vec<f64>>>().filter(|n| n.len() <= MOST_NUMBERS)
@@ -69,8 +64,9 @@ mod tests {
     use crate::recording::Numbers;
 
     fn read(text: impl Fn(usize) -> String) -> Vec<Track> {
-        let texts: Vec<_> = (0..4).map(|i| (PathBuf::from(format!("view{i}.txt")), Some(i as u64), text(i))).collect();
-        super::texts("view#.txt", Role::Unknown, &texts)
+        let names: Vec<String> = (0..4).map(|i| format!("view{i}.txt")).collect();
+        let files = names.iter().enumerate().map(|(i, name)| (Path::new(name), Some(i as u64), numbers(&text(i))));
+        tracks("view#.txt", Role::Unknown, files)
     }
 
     #[test]

@@ -33,7 +33,7 @@ impl Run {
 }
 
 /// The camera of a text. Where it has a matrix and no distortion, that of a file beside is taken that is called so.
-pub(crate) fn read(text: &str, file: &Path, root: &Path) -> Option<FoundCamera> {
+pub(super) fn read(text: &str, file: &Path, root: &Path) -> Option<FoundCamera> {
     let runs = runs(text)?;
     let (at, matrix) = matrix(&runs)?;
     let mut fields = vec![("camera_matrix".to_owned(), list(&matrix))];

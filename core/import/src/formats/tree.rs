@@ -2,11 +2,16 @@
 //! a rotation beside a translation; in a list, under keys that count, or one to a file.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
-use super::named;
+use super::Encoding::{self, Json, Xml, Yaml};
 use super::parts::{self, Part};
+use super::{File, Format, joints, named};
 use crate::conventions::{Euler, RotationForm, is_unit, rigid};
+use crate::folder;
+use crate::nothing::Likely;
+use crate::reader::Reader;
 use crate::recording::{Known, Numbers, Role, Sample, Stated, Track};
 use crate::value::Value;
 use handeye_wording::Text;
@@ -18,6 +23,47 @@ pub(crate) const LEAST_POSES: usize = 3;
 const MOST_SERIES: usize = 32;
 /// Elements of a list that are not a series and are looked into.
 const MOST_LOOKED_INTO: usize = 8;
+
+pub(super) struct Documents;
+
+impl Format for Documents {
+    fn name(&self) -> Text {
+        Text::verbatim("JSON, YAML, XML")
+    }
+
+    fn endings(&self) -> &'static [(&'static str, Encoding)] {
+        &[("json", Json), ("jsonl", Json), ("yaml", Yaml), ("yml", Yaml), ("xml", Xml)]
+    }
+
+    /// A camera in JSON lies beside poses more rarely than other poses do.
+    fn is_beside(&self, file: &Path, _named: &Path) -> bool {
+        !folder::ending(file).starts_with("json")
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.value().is_some()
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let (Some(value), name) = (file.value(), file.name()) else { return false };
+        reader.recording.tracks.extend(series(value, &name));
+        reader.recording.joints.extend(joints::of_document(value, &name));
+        true
+    }
+
+    fn instead(&self, file: &File, _reader: &Reader<'_>) -> Option<(Likely, Text)> {
+        file.value().map(instead)
+    }
+}
+
+/// What a document has in place of a series.
+pub(super) fn instead(value: &Value) -> (Likely, Text) {
+    match fields(value).poses.len() {
+        0 => (Likely::Neither, text!("no fields that are poses")),
+        1 => (Likely::Poses, text!("one pose, and three make a series")),
+        many => (Likely::Poses, text!("{count} poses under different names, which are no series", count = many)),
+    }
+}
 
 /// What one element of a series, or one file, has.
 #[derive(Debug, Clone, Default)]
@@ -164,7 +210,7 @@ fn is_counting(key: &str) -> bool {
 
 /// Whether a text is the name of an image.
 pub(crate) fn is_image_name(text: &str) -> bool {
-    text.len() < 1024 && super::super::folder::is_image(std::path::Path::new(text.trim()))
+    text.len() < 1024 && folder::is_image(Path::new(text.trim()))
 }
 
 /// What a pose of so many numbers may be.
@@ -396,13 +442,13 @@ pub(crate) fn call_after_files(tracks: &mut [Track], files: &str, of_files: Role
 
 /// Whether a table or a program is of the target by its name or that of its folder, which may be one of images of it.
 pub(crate) fn is_of_target(file: &str) -> bool {
-    let stem = std::path::Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
+    let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
     role(file) == Role::Target && role(&stem) != Role::Robot
 }
 
 /// What poses in a document of this name are of; those of a camera may be of what carries it.
 pub(crate) fn role_of_document(file: &str) -> Role {
-    let stem = std::path::Path::new(file).file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
     role_of_files(&stem.replace("cam", ""))
 }
 

@@ -1,22 +1,61 @@
 //! ViSP: a `vpPoseVector` to a file (three translations, then the rotation vector, metres and radians), a camera in XML, and
 //! the target as text.
 
-use super::tree;
+use super::{File, Format, pose_files, tree};
 use crate::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use crate::folder;
+use crate::reader::Reader;
 use crate::recording::{FoundCamera, FoundTarget, Known, Role, Stated, Track};
-use crate::value::{self, Value};
+use crate::value::Value;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::targets::{AprilTag, Dictionary, Grid, TargetSpec};
+use handeye_wording::Text;
+
+pub(super) struct Visp;
+
+impl Format for Visp {
+    fn name(&self) -> Text {
+        Text::verbatim("ViSP")
+    }
+
+    fn is_of_poses(&self) -> bool {
+        false
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.value().is_some() || file.text().is_some()
+    }
+
+    fn read_together(&self, files: &[File], reader: &mut Reader<'_>) -> bool {
+        let vectors = files.iter().filter_map(File::value).filter(|value| is_pose(value)).count();
+        if files.len() < tree::LEAST_POSES || 2 * vectors <= files.len() {
+            return false;
+        }
+        let mut tracks = pose_files::tracks(files, reader);
+        tracks.iter_mut().for_each(know);
+        let is_so = !tracks.is_empty();
+        reader.recording.tracks.extend(tracks);
+        is_so
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let name = file.name();
+        reader.recording.targets.extend(file.text().and_then(|text| target(text, &name)));
+        let xml = file.value().filter(|_| folder::ending(&file.path) == "xml");
+        reader.recording.cameras.extend(xml.and_then(|value| camera(value, &name)));
+        false
+    }
+}
 
 /// Whether a document is a vector of six numbers as ViSP saves it.
-pub(crate) fn is_pose(value: &Value) -> bool {
+fn is_pose(value: &Value) -> bool {
     value.get("rows").and_then(Value::whole) == Some(6)
         && value.get("cols").and_then(Value::whole) == Some(1)
         && value.numbers(6).is_some_and(|numbers| numbers.len() == 6)
 }
 
 /// What is known of a series of such files.
-pub(crate) fn know(track: &mut Track) {
+fn know(track: &mut Track) {
     let by = |what: &str| format!("ViSP's pose vectors are {what}");
     track.stated = Stated {
         length: Some(Known::by(by("in metres"), LengthUnit::Metre)),
@@ -36,13 +75,22 @@ pub(crate) fn know(track: &mut Track) {
     }
 }
 
+/// A value by its name, wherever it stands first.
+fn first<'a>(value: &'a Value, name: &str) -> Option<&'a Value> {
+    match value {
+        Value::Map(entries) => {
+            let within = |(key, inner): &'a (String, Value)| if key == name { Some(inner) } else { first(inner, name) };
+            entries.iter().find_map(within)
+        }
+        Value::List(items) => items.iter().find_map(|item| first(item, name)),
+        _ => None,
+    }
+}
+
 /// A camera from ViSP's XML.
-pub(crate) fn camera(text: &str, file: &str) -> Option<FoundCamera> {
-    let document = value::xml(text).ok()?;
-    let camera = document.descendants().find(|node| node.has_tag_name("camera"))?;
-    let number = |name: &str| -> Option<f64> {
-        camera.descendants().find(|node| node.has_tag_name(name))?.text()?.trim().parse().ok()
-    };
+fn camera(value: &Value, file: &str) -> Option<FoundCamera> {
+    let camera = first(value, "camera")?;
+    let number = |name: &str| first(camera, name)?.number();
     let (width, height) = (number("image_width").unwrap_or(0.0), number("image_height").unwrap_or(0.0));
     let kud = number("kud").unwrap_or(0.0);
     let distortion = if kud == 0.0 { Distortion::None } else { Distortion::BrownConrady([kud, 0.0, 0.0, 0.0, 0.0]) };
@@ -63,7 +111,7 @@ pub(crate) fn camera(text: &str, file: &str) -> Option<FoundCamera> {
 
 /// A target from the note that lies beside ViSP's data: `Chessboard`, `9 x 6`, `square size: 0.0236 m`, or the family of a tag
 /// and its size, without its number.
-pub(crate) fn target(text: &str, file: &str) -> Option<FoundTarget> {
+fn target(text: &str, file: &str) -> Option<FoundTarget> {
     let lower = text.to_lowercase();
     let size = |key: &str| -> Option<f64> {
         let rest = lower.split_once(key)?.1;

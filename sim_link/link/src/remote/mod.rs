@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use handeye_cell::scene::SceneChoice;
 use handeye_coppeliasim::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
-use handeye_coppeliasim::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, SimulationState};
+use handeye_coppeliasim::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use handeye_geometry::frames::{Base, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 use handeye_server::{CellConfig, CellServer};
@@ -177,8 +177,8 @@ impl ControlPort for RemoteControl {
         self.arm.sim().start_simulation().map_err(port_error)
     }
 
-    fn renew(&mut self) {
-        self.arm.sim().connection().renew();
+    fn renew(&mut self) -> Result<(), PortError> {
+        renew(self.arm.sim())
     }
 
     fn stop_simulation(&mut self) -> Result<(), PortError> {
@@ -235,14 +235,20 @@ impl CameraPort for RemoteCamera {
         })))
     }
 
-    fn renew(&mut self) {
-        self.feed.sim().connection().renew();
+    fn renew(&mut self) -> Result<(), PortError> {
+        renew(self.feed.sim())
     }
 
     fn depth_limits_m(&self) -> [f32; 2] {
         let optics = &self.feed.info().depth_optics;
         [optics.near_m as f32, optics.far_m as f32]
     }
+}
+
+/// Another connection, which is there once something was asked over it.
+fn renew(sim: &mut Sim) -> Result<(), PortError> {
+    sim.connection().renew();
+    sim.get_simulation_time().map(drop).map_err(port_error)
 }
 
 fn start_built_in(scene: &SceneChoice) -> Result<CellServer, PortError> {

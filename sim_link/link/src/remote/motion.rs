@@ -133,8 +133,8 @@ impl RemoteMotion {
 }
 
 impl MotionPort for RemoteMotion {
-    fn renew(&mut self) {
-        self.arm.sim().connection().renew();
+    fn renew(&mut self) -> Result<(), PortError> {
+        super::renew(self.arm.sim())
     }
 
     fn step_by_step(&mut self, on: bool) -> Result<(), PortError> {

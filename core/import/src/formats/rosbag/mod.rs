@@ -13,13 +13,15 @@ mod storage;
 mod wire;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-use super::{joints, tree};
+use super::{Encoding, File, Format, joints, tree};
 use crate::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
+use crate::folder;
+use crate::reader::Reader;
 use crate::recording::{JointSeries, Known, Numbers, Recording, Role, Sample, Stated, Track};
 use contents::{Bag, Timed, nearest};
 use handeye_files::budget::Budget;
@@ -36,11 +38,61 @@ const ENOUGH_RESTS: usize = 6;
 /// Most images that are taken out of a bag.
 const MOST_IMAGES: usize = 1000;
 
+pub(super) struct Bags;
+
+impl Format for Bags {
+    fn name(&self) -> Text {
+        text!("bags of ROS 2 and ROS 1")
+    }
+
+    fn endings(&self) -> &'static [(&'static str, Encoding)] {
+        const HOW: Encoding = Encoding::Bag;
+        &[("mcap", HOW), ("db3", HOW), ("bag", HOW), ("mcap.zstd", HOW), ("db3.zstd", HOW)]
+    }
+
+    fn read_together(&self, files: &[File], reader: &mut Reader<'_>) -> bool {
+        for files in bags(files, reader.root) {
+            let parts: Vec<PathBuf> = files.iter().map(|file| reader.root.join(file)).collect();
+            let name = if files.len() > 1 { folder_of(files[0]) } else { files[0] };
+            let read = read(&name.display().to_string(), &parts, reader.budget, &mut reader.recording);
+            if let Err(why) = read {
+                reader.not_used(files[0], why);
+            }
+        }
+        true
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().unwrap_or(Path::new(""))
+}
+
+/// The files of every bag: those of ROS 2 with its description beside them are one, compressed or not; others are each a bag.
+fn bags<'a>(files: &'a [File], root: &Path) -> Vec<Vec<&'a Path>> {
+    let has_description =
+        |file: &Path| folder::ending(file) != "bag" && root.join(folder_of(file)).join("metadata.yaml").is_file();
+    let mut bags: Vec<Vec<&Path>> = Vec::new();
+    for file in files.iter().map(|file| file.path.as_path()) {
+        // Whoever plays a compressed bag leaves its files unpacked beside it.
+        if folder::ending(file) == "zstd" && files.iter().any(|other| other.path == file.with_extension("")) {
+            continue;
+        }
+        let open = bags.iter_mut().find(|bag| {
+            has_description(file) && folder::ending(bag[0]) != "bag" && folder_of(bag[0]) == folder_of(file)
+        });
+        match open {
+            Some(bag) => bag.push(file),
+            None => bags.push(vec![file]),
+        }
+    }
+    bags
+}
+
 /// Takes what a bag has into a recording; `parts` are its files in order.
 ///
 /// # Errors
 /// A sentence, where it is no bag, its images cannot be unpacked or the budget is spent.
-pub(crate) fn read(file: &str, parts: &[PathBuf], budget: &Budget<'_>, recording: &mut Recording) -> Result<(), Text> {
+fn read(file: &str, parts: &[PathBuf], budget: &Budget<'_>, recording: &mut Recording) -> Result<(), Text> {
     let (parts, _scratch) = storage::plain_parts(parts, budget)?;
     let bag = Bag::read(&parts, budget)?;
     if bag.images.is_empty() {
@@ -53,16 +105,20 @@ pub(crate) fn read(file: &str, parts: &[PathBuf], budget: &Budget<'_>, recording
     for (topic, stamps) in &bag.images {
         let rests = rests(&bag, stamps, budget);
         budget.check()?;
-        recording.beliefs.push(format!(
-            "{file}: {} images on {topic}, {} of them taken where everything stood still",
-            stamps.len(),
-            rests.len()
+        recording.beliefs.push(text!(
+            "{file}: {images} images on {topic}, {rests} of them taken where everything stood still",
+            file = file,
+            images = stamps.len(),
+            topic = topic,
+            rests = rests.len()
         ));
         let in_motion = motion::chosen(stamps, &motions);
         if rests.len() < ENOUGH_RESTS && !in_motion.is_empty() {
-            recording.beliefs.push(format!(
-                "{file}: {} images on {topic} of a robot that moves are looked at, to be given poses by their stamps",
-                in_motion.len()
+            recording.beliefs.push(text!(
+                "{file}: {images} images on {topic} of a robot that moves are looked at, to be given poses by their stamps",
+                file = file,
+                images = in_motion.len(),
+                topic = topic
             ));
             let mut looked_at = in_motion;
             if rests.len() >= tree::LEAST_POSES {

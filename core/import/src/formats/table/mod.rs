@@ -8,16 +8,77 @@ mod labels;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::joints;
 use super::tree::is_image_name;
+use super::{Encoding, File, Format, blocks, joints, tree};
+use crate::nothing::Likely;
+use crate::reader::Reader;
 use crate::recording::{JointSeries, Numbers, Sample, Track};
 use crate::value::number;
 use cells::Line;
 use handeye_wording::Text;
 use handeye_wording::text;
 
+pub(super) struct Tables;
+
+impl Format for Tables {
+    fn name(&self) -> Text {
+        text!("tables")
+    }
+
+    fn endings(&self) -> &'static [(&'static str, Encoding)] {
+        const HOW: Encoding = Encoding::Text;
+        &[("csv", HOW), ("txt", HOW), ("tsv", HOW), ("dat", HOW), ("log", HOW), ("", HOW)]
+    }
+
+    fn sniff(&self, file: &File) -> bool {
+        file.text().is_some()
+    }
+
+    fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
+        let (Some(text), name) = (file.text(), file.name()) else { return false };
+        let tracks = read(&name, text);
+        let joints = if tracks.is_empty() { joints(&name, text) } else { None };
+        let is_so = !tracks.is_empty() || joints.is_some();
+        reader.recording.tracks.extend(tracks);
+        reader.recording.joints.extend(joints);
+        reader.recording.rows.extend(unnamed(&name, text));
+        is_so
+    }
+
+    fn instead(&self, file: &File, _reader: &Reader<'_>) -> Option<(Likely, Text)> {
+        let instead = file.value().map(tree::instead).or_else(|| file.text().map(instead))?;
+        // Programs and licences have no ending either.
+        (file.path.extension().is_some() || instead.0 != Likely::Neither).then_some(instead)
+    }
+}
+
+/// What a text has in place of a series.
+fn instead(text: &str) -> (Likely, Text) {
+    let mut widths: BTreeMap<usize, usize> = BTreeMap::new();
+    for line in cells::lines(text).iter().filter(|line| line.is_numeric()) {
+        *widths.entry(line.numbers().len()).or_default() += 1;
+    }
+    let Some((width, rows)) = widths.iter().max_by_key(|(_, rows)| **rows) else {
+        let poses = blocks::document(text).map_or(0, |value| tree::fields(&value).poses.len());
+        return if poses > 0 {
+            (Likely::Poses, text!("{count} of the poses of which three make a series", count = poses))
+        } else {
+            (Likely::Neither, text!("no rows of numbers"))
+        };
+    };
+    let why = match (*rows, width) {
+        (1, _) => text!("one row of {width} numbers, and three make a series"),
+        (2, _) => text!("two rows of {width} numbers, and three make a series"),
+        (_, 5..=8) => text!(
+            "{rows} rows of {width} numbers that are no poses: if they are joint values, name the arm with arm=NAME"
+        ),
+        _ => text!("{rows} rows of {width} numbers, of which poses are not made"),
+    };
+    (Likely::Numbers, why.with("rows", rows).with("width", width))
+}
+
 /// The series of poses in a text, which may be none.
-pub(crate) fn read(file: &str, text: &str) -> Vec<Track> {
+fn read(file: &str, text: &str) -> Vec<Track> {
     let lines = cells::lines(text);
     let groups = labels::groups(&lines).unwrap_or_default();
     let mut tracks = Vec::new();
@@ -50,21 +111,12 @@ fn of_lines(file: &str, lines: &[Line]) -> Vec<Track> {
 }
 
 /// The joint values of a text that has no poses.
-pub(crate) fn joints(file: &str, text: &str) -> Option<JointSeries> {
+fn joints(file: &str, text: &str) -> Option<JointSeries> {
     header::joints(file, &cells::lines(text))
 }
 
-/// How many rows of a text have how many numbers.
-pub(crate) fn widths(text: &str) -> BTreeMap<usize, usize> {
-    let mut widths = BTreeMap::new();
-    for line in cells::lines(text).iter().filter(|line| line.is_numeric()) {
-        *widths.entry(line.numbers().len()).or_default() += 1;
-    }
-    widths
-}
-
 /// The rows of a text without a header, which may be joint values.
-pub(crate) fn unnamed(file: &str, text: &str) -> Option<JointSeries> {
+fn unnamed(file: &str, text: &str) -> Option<JointSeries> {
     let lines = cells::lines(text);
     if header::with_header(file, &lines).is_some() || header::joints(file, &lines).is_some() {
         return None;
