@@ -1,11 +1,11 @@
 //! The server from which viewers read, and the page with the web viewer: one port, of this machine.
 //!
 //! A server of Rerun keeps what it has sent for viewers that come later, up to a limit, and forgets the oldest first. Images
-//! would push the captures out within three minutes, so what lasts and what is live are kept by two of them, and read as one.
+//! would push the captures out, so what lasts and what is live are kept by two of them, and read as one.
 //!
-//! Rerun's own server listens by itself, and answers whoever asks and by whatever name; one viewer that reads nothing holds up
-//! all others (`docs/reference/rerun_viewers.md` has what was measured). So what it serves is taken out of it here and put
-//! behind a [`Door`], in this process: there is no port behind the door that somebody else could find.
+//! Rerun's own server listens by itself, and answers whoever asks and by whatever name (`docs/reference/rerun_viewers.md` has
+//! what was measured). So what it serves is taken out of it here and put behind a [`Door`], in this process: there is no port
+//! behind the door that somebody else could find.
 
 mod page;
 mod proxy;
