@@ -14,7 +14,10 @@ use egui::epaint::{ClippedPrimitive, ClippedShape, Mesh, Primitive};
 pub struct Chunk {
     /// Of the bytes; two chunks with one hash are one chunk.
     pub hash: u64,
-    /// As in docs/reference/browser.md.
+    /// Little endian: clip rectangle \[points\] as `f32` left, top, right, bottom; `u32` number of the texture; `u32` count of
+    /// vertices n; `u32` count of indices m; n vertices of 20 bytes: `f32` x, y \[points\], `f32` u, v in the texture, `u8` red,
+    /// green, blue, alpha (multiplied by alpha); m indices, three to a triangle, as `u16`, or as `u32` where n is above 65,536;
+    /// zeros up to a multiple of 4.
     pub bytes: Arc<[u8]>,
 }
 
