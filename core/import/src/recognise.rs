@@ -58,7 +58,9 @@ pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<
     budget.check().map_err(stopped)?;
     let found = &mut reader.recording;
     (found.still, found.tracks) = std::mem::take(&mut found.tracks).into_iter().partition(Track::is_still);
-    ALL.iter().for_each(|format| format.finish(found));
+    for format in ALL {
+        format.finish(found);
+    }
     if found.tracks.is_empty() && found.joints.is_empty() && found.motions.is_empty() {
         reader.recording.nothing = nothing::reasons(&reader, &files);
         budget.check().map_err(stopped)?;

@@ -151,10 +151,10 @@ pub const EXAMPLES: &str = "Examples:
   handeye auto --poses seed10 --out session --json result.json
   handeye auto --poses guided --goal 0.3 --scene panda --out guided
 
-On a real cell, first to see what it would do:
-  handeye auto --driver \"python3 my_robot.py\" --camera-driver \"handeye driver v4l\" \\
-    --target 9x6x25 --poses poses.toml --dry-run
-Then with --allow-motion in place of --dry-run.";
+On a real cell, where --allow-motion for --dry-run moves the robot:
+  handeye auto --driver \"python3 my_robot.py\" \\
+      --camera-driver \"handeye driver v4l\" --target 9x6x25 \\
+      --poses poses.toml --dry-run";
 
 pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();

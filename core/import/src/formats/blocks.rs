@@ -53,7 +53,7 @@ pub(super) fn document(text: &str) -> Option<Value> {
         }
     }
     reader.end_of_record();
-    let mut records = reader.records;
+    let mut records = reader.whole;
     match records.len() {
         0 => None,
         1 => records.pop(),
@@ -63,7 +63,7 @@ pub(super) fn document(text: &str) -> Option<Value> {
 
 #[derive(Default)]
 struct Records {
-    records: Vec<Value>,
+    whole: Vec<Value>,
     /// Fields of the record that is being read, and their names.
     fields: Vec<(String, Value)>,
     known: HashSet<String>,
@@ -176,7 +176,7 @@ impl Records {
         self.known.clear();
         let has_numbers = fields.iter().any(|(name, value)| name != "number" && !matches!(value, Value::Text(_)));
         if has_numbers {
-            self.records.push(Value::Map(fields));
+            self.whole.push(Value::Map(fields));
         }
     }
 }

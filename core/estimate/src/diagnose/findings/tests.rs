@@ -99,7 +99,7 @@ fn too_few_views_are_a_problem_below_three_and_advice_below_ten() {
     assert_eq!((found[0].severity, found[0].value("needed")), (Severity::Problem, Some(3.0)));
     let missing = find(&found, FindingCode::TargetNotFound).expect("seven");
     assert_eq!(missing.views, ["000", "001", "002", "003", "004", "005", "006"]);
-    assert!(missing.to_string().contains("0, 1, 2, 3 and 3 more"), "{missing}");
+    assert!(missing.to_string().contains("000, 001, 002, 003 and 3 more"), "{missing}");
 }
 
 #[test]
