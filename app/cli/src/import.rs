@@ -23,7 +23,9 @@ use handeye_workbench::import::understand::{self, NotUnderstood};
 
 /// At the end of its help.
 pub fn after_help() -> String {
-    let formats: String = understand::formats_said().iter().map(|line| format!("  {}\n", line.say(English))).collect();
+    let formats: Vec<String> =
+        understand::formats_said().iter().map(|line| format!("  {}", line.say(English))).collect();
+    let formats = formats.join("\n") + "\n";
     format!(
         "What is read:\n{formats}\nKeys of --set:\n{}\n\nExamples, on a recording without a description of what its files mean:\n  \
          handeye sample --out recording && rm recording/dataset.toml\n  \

@@ -158,11 +158,11 @@ impl OpenCell {
     /// When the connection is lost.
     pub fn views(
         &mut self,
-        board: BoardInView,
+        board: &BoardInView,
         count: usize,
         seed: u64,
     ) -> Result<Result<Vec<JointValues>, Failure>, Failure> {
-        let request = ViewsRequest { board, taken: Vec::new(), count, seed };
+        let request = ViewsRequest { board: *board, taken: Vec::new(), count, seed };
         let views = self.motion.views(&request).map_err(|error| port_failure(&error))?;
         Ok(views.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.say(Language::English)))))
     }
@@ -347,18 +347,14 @@ impl OpenCell {
             }
             std::thread::sleep(LOOK);
         }
-        match watch.moved() {
-            Some(moved) => {
-                let kind = |joint: usize| self.facts.joints.get(joint).map(|joint| joint.kind);
-                let moved = moved_text(&moved, kind).say(Language::English);
-                tracing::error!(
-                    "the robot was told to stop and still moves: {moved} since. Use its own emergency stop"
-                );
-            }
-            None => tracing::error!(
+        let Some(moved) = watch.moved() else {
+            return tracing::error!(
                 "the robot was told to stop, and no state has come since: it is not known whether it stands. Look at it"
-            ),
-        }
+            );
+        };
+        let kind = |joint: usize| self.facts.joints.get(joint).map(|joint| joint.kind);
+        let moved = moved_text(&moved, kind).say(Language::English);
+        tracing::error!("the robot was told to stop and still moves: {moved} since. Use its own emergency stop");
     }
 }
 

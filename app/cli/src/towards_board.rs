@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use handeye_coppeliasim::cell::BoardInView;
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_workbench::session::start::{BOARD, REFERENCE_POSES};
 
@@ -39,13 +39,13 @@ impl TowardsBoard {
     pub fn all(cell: &mut OpenCell) -> Result<Vec<Self>, Failure> {
         let views = match board_in_view(cell)? {
             // A board out of reach has no views.
-            Some(board) => cell.views(board, VIEWS, SEED)?.unwrap_or_default(),
+            Some(board) => cell.views(&board, VIEWS, SEED)?.unwrap_or_default(),
             None => Vec::new(),
         };
         let named = |joints: &[f64], name| Self { name, goal: Goal::Joints(joints.to_vec()) };
         let views = views.iter().map(|joints| named(joints, "a view of the board"));
         let reference = TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES).map_err(Failure::failed)?;
-        let is_ur5 = cell.is_simulated() && cell.kinematics().is_some_and(|arm| arm.is_ur5());
+        let is_ur5 = cell.is_simulated() && cell.kinematics().is_some_and(ArmKinematics::is_ur5);
         let start = reference.start_joints_rad.filter(|_| is_ur5);
         let start = start.map(|joints| named(&joints, "the start of the reference poses"));
         Ok(views.chain(start).collect())

@@ -161,7 +161,7 @@ impl Stream {
     /// # Errors
     /// [`RecordError`].
     pub fn begin(&mut self) -> Result<(), RecordError> {
-        self.writer.begin(&self.lasting)
+        SceneWriter::begin(&self.lasting)
     }
 
     /// Writes something that lasts.

@@ -278,13 +278,11 @@ fn target_of(args: &AutoArgs) -> Result<TargetSpec, Failure> {
 /// The chain that `--arm` names, once it agrees with what the robot reports.
 fn named_arm(named: &str, cell: &mut OpenCell) -> Result<ArmKinematics, Failure> {
     let here = cell.robot_state()?.joints_rad;
-    match cell.kinematics() {
-        Some(read) => arm_arg::checked(named, read, &here),
-        None => {
-            let unknown = cell.robot()?.err().map_or_else(String::new, |unknown| format!(": {unknown}"));
-            Err(Failure::failed(anyhow::anyhow!("--arm {named} cannot be checked against the robot{unknown}")))
-        }
+    if let Some(read) = cell.kinematics() {
+        return arm_arg::checked(named, read, &here);
     }
+    let unknown = cell.robot()?.err().map_or_else(String::new, |unknown| format!(": {unknown}"));
+    Err(Failure::failed(anyhow::anyhow!("--arm {named} cannot be checked against the robot{unknown}")))
 }
 
 /// What `--dry-run` shows.

@@ -89,7 +89,7 @@ impl Plan {
                  --object board=PATH, or bring it into the image and use --poses guided"
             ))
         })?;
-        let views = cell.views(board, PLANNED_VIEWS, seed)?;
+        let views = cell.views(&board, PLANNED_VIEWS, seed)?;
         let views = views.map_err(|why| {
             Failure::failed(anyhow::anyhow!(
                 "no views of the board are planned: {why}; --poses FILE takes them from a file"

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use handeye_coppeliasim::cell::{BoardMotion, FollowEnd};
+use handeye_coppeliasim::cell::{ArmKinematics, BoardMotion, FollowEnd};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median_high;
@@ -166,7 +166,7 @@ fn follow_board(
         .map_err(|_panic| Failure::failed(anyhow::anyhow!("the thread that moves the arm ended with a panic")))?;
     watched?;
     let end = followed?;
-    let summary = &mut watch.taken.summary;
+    let summary = &mut *watch.taken.summary;
     // What ends in the very moment in which it was followed enough has done what it was asked to.
     if watch.cancel.is_cancelled() || job.frames.is_some_and(|frames| summary.frames >= frames) {
         return Ok(());
@@ -187,7 +187,7 @@ fn follow_board(
 fn prepare_own_cell(cell: &mut OpenCell, board: &BoardMotion, cancel: &CancelToken) -> Result<(), Failure> {
     cell.set_going(false).map_err(|error| port_failure(&error))?;
     // The reference poses are those of the UR5. Any other arm begins where its scene has it.
-    if cell.kinematics().is_some_and(|arm| arm.is_ur5()) {
+    if cell.kinematics().is_some_and(ArmKinematics::is_ur5) {
         look_at_board(cell, cancel)?;
     }
     cell.control.move_board(board).map_err(|error| port_failure(&error))

@@ -113,7 +113,7 @@ impl SceneWriter {
     ///
     /// # Errors
     /// [`RecordError::Stream`].
-    pub fn begin(&mut self, rec: &RecordingStream) -> Result<(), RecordError> {
+    pub fn begin(rec: &RecordingStream) -> Result<(), RecordError> {
         let pen = Pen::new(rec);
         pen.write_static("/", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
         pen.write_static(paths::BASE, &axes(style::LARGE_AXES))?;

@@ -37,7 +37,7 @@ impl Bench {
     }
 
     fn begin(&mut self) -> Entities {
-        self.writer.begin(&self.rec).expect("begun");
+        SceneWriter::begin(&self.rec).expect("begun");
         self.written()
     }
 

@@ -5,7 +5,6 @@ use std::io;
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use axum::extract::State;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
     X_CONTENT_TYPE_OPTIONS,
@@ -57,10 +56,10 @@ impl Files {
     }
 
     /// A file of the viewer; the page itself has no name.
-    pub(super) async fn answer(State(files): State<Arc<Self>>, uri: Uri) -> Response {
-        let part = |part: fn(&WebViewerData) -> &[u8]| Bytes::from_owner(Part(Arc::clone(&files.viewer), part));
+    pub(super) fn answer(&self, uri: &Uri) -> Response {
+        let part = |part: fn(&WebViewerData) -> &[u8]| Bytes::from_owner(Part(Arc::clone(&self.viewer), part));
         let (kind, body) = match uri.path().strip_prefix(BROWSER_PATH).unwrap_or_default() {
-            "" | "index.html" => ("text/html; charset=utf-8", files.index.clone()),
+            "" | "index.html" => ("text/html; charset=utf-8", self.index.clone()),
             "favicon.ico" => ("image/x-icon", part(WebViewerData::favicon)),
             "apple-touch-icon.png" => ("image/png", part(WebViewerData::apple_touch_icon)),
             "re_viewer.js" => ("text/javascript", part(WebViewerData::viewer_js)),

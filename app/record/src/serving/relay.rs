@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::Router;
 use axum::extract::{Request, State};
-use axum::http::StatusCode;
 use axum::http::header::{CONTENT_TYPE, HOST, HeaderName, LOCATION};
+use axum::http::{StatusCode, Uri};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{any, get};
 use re_protos::sdk_comms::v1alpha1::message_proxy_service_server::{MessageProxyService, MessageProxyServiceServer};
@@ -51,7 +51,7 @@ impl Relay {
         let routes = Router::new()
             .route_service(READ, service)
             .route(BROWSER_PATH, get(page))
-            .route(FILE, get(Files::answer))
+            .route(FILE, get(file))
             .with_state(Arc::new(Files::load()?));
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(routes);
         Ok(())
@@ -72,10 +72,15 @@ async fn answer(State(relay): State<Arc<Relay>>, request: Request) -> Response {
     }
 }
 
+/// A file that the page loads.
+async fn file(State(files): State<Arc<Files>>, uri: Uri) -> Response {
+    files.answer(&uri)
+}
+
 /// The page; the viewer is told in its address where the recording is.
-async fn page(files: State<Arc<Files>>, request: Request) -> Response {
+async fn page(State(files): State<Arc<Files>>, request: Request) -> Response {
     if request.uri().query().is_some() {
-        return Files::answer(files, request.uri().clone()).await;
+        return files.answer(request.uri());
     }
     let host = request.headers().get(HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
     let url = encoded(&format!("rerun+http://{host}/proxy"));
