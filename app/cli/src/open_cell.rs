@@ -184,6 +184,12 @@ impl OpenCell {
         self.facts.arm.as_ref()
     }
 
+    /// Plans for the arm by this chain from now on; before it is told what to keep out of.
+    pub fn plan_by(&mut self, kinematics: ArmKinematics) {
+        self.motion.plan_by(&kinematics);
+        self.facts.arm = Some(kinematics);
+    }
+
     /// Has the arm keep out of these from now on.
     ///
     /// # Errors

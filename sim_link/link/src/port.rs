@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{BoardInView, BoardMotion, FollowEnd, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, BoardMotion, FollowEnd, FollowMoment, FollowWish};
 use handeye_dataset::taught_poses::MotionLimits;
 use handeye_driver::LogLevel;
 use handeye_geometry::depth::DepthImage;
@@ -245,6 +245,10 @@ pub trait MotionPort: Send {
     fn pass(&mut self, _cancel: &CancelToken) -> Result<(), PortError> {
         Ok(())
     }
+
+    /// Plans for a simulated arm by this chain of joints from now on, in place of the one that was read from the simulation. Before
+    /// [`Self::keep_out`].
+    fn plan_by(&mut self, _kinematics: &ArmKinematics) {}
 
     /// The fastest that a simulated arm moves from now on; a robot behind a driver has limits of its own.
     fn limit(&mut self, _limits: &MotionLimits) {}

@@ -182,6 +182,10 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     plan.check_joints(cell.facts.joints.len())?;
     cell.limit(&plan.limits);
     let ran_before = cell.robot_state()?.simulation != Simulation::Stopped;
+    if let Some(named) = &args.arm {
+        let known = named_arm(named, &mut cell)?;
+        cell.plan_by(known);
+    }
     if let Some(keep_out) = &keep_out {
         cell.keep_out(keep_out)?;
     }
@@ -191,10 +195,6 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
             "guided capture takes an arm whose chain is known: {unknown}; give the poses by a file, --poses FILE"
         )));
     }
-    let kinematics = match &args.arm {
-        None => cell.kinematics().cloned(),
-        Some(named) => Some(named_arm(named, &mut cell)?),
-    };
     if plans_here {
         plan = Plan::planned_here(&mut cell, seed)?;
     }
@@ -207,7 +207,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let truth = cell.facts.truth.clone();
     let meta = SessionMeta {
         seeds: args.cell.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
-        arm: start::arm(kinematics.as_ref()),
+        arm: start::arm(cell.kinematics()),
         joint_kinds: start::joint_kinds(cell.facts.joints.iter().map(|joint| joint.kind)),
         target,
         mode: args.mode.unwrap_or(Mode::EyeInHand),

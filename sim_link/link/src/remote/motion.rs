@@ -145,6 +145,11 @@ impl MotionPort for RemoteMotion {
         self.arm.sim().step(&CallOptions::cancelled_by(cancel)).map_err(port_error)
     }
 
+    fn plan_by(&mut self, kinematics: &ArmKinematics) {
+        self.kinematics = Ok(kinematics.clone());
+        self.keep_to(&Surroundings::default());
+    }
+
     fn limit(&mut self, limits: &taught_poses::MotionLimits) {
         self.limits = *limits;
     }

@@ -121,6 +121,29 @@ fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named(
     assert!(mm < 3.0 * stated_mm, "{mm} mm, stated {stated_mm} mm");
 }
 
+/// A cable that a turn of the hand would tear, said by the limits of a URDF file.
+#[test]
+fn poses_are_chosen_by_the_chain_that_was_named_with_its_ranges() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let urdf = std::fs::read_to_string(workspace_root().join("assets/arms/panda.urdf")).expect("it is shipped");
+    let range = r#"lower="-2.8973" upper="2.8973""#;
+    let (before, after) = urdf.rsplit_once(range).expect("of the last joint");
+    let narrow = folder.path().join("narrow.urdf");
+    std::fs::write(&narrow, format!(r#"{before}lower="0.3" upper="1.2"{after}"#)).expect("written");
+    let turns = |name: &str, more: &[&str]| -> Vec<f64> {
+        let out = folder.path().join(name);
+        let poses = ["auto", "--quiet", "--rerun", "off", "--scene", "panda", "--poses", "guided", "--max-poses", "8"];
+        let output = handeye(&[&poses[..], &["--out", out.to_str().expect("UTF-8")], more].concat());
+        let document = Session::open(&out).unwrap_or_else(|_| panic!("{output:?}")).document;
+        document.captures.iter().filter_map(|capture| capture.joints_rad.as_ref()?.last().copied()).collect()
+    };
+    let is_within = |angle: &f64| (0.3..=1.2).contains(angle);
+    let free = turns("free", &[]);
+    assert!(!free.iter().all(is_within), "the hand is turned where nothing forbids it: {free:?}");
+    let kept = turns("kept", &["--arm", narrow.to_str().expect("UTF-8")]);
+    assert!(kept.len() > 3 && kept.iter().all(is_within), "{kept:?}");
+}
+
 /// Over a connection nobody has given a scene: the views are of the board of the cell that is there, by its arm.
 #[test]
 fn views_are_planned_for_the_arm_and_the_board_of_a_cell_that_is_connected_to() {
