@@ -9,6 +9,7 @@ use handeye_record::{RerunChoice, WebViewer, record};
 use handeye_workbench::app::{App, Connect, Start};
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, Model, ViewSettings};
+use handeye_workbench::motion;
 use handeye_workbench::text::Language;
 use handeye_workbench::worker::{Clock, Waker};
 
@@ -67,7 +68,7 @@ impl Workbench {
     }
 
     /// A click.
-    pub fn click(&mut self, command: Command) {
+    pub fn click(&mut self, command: impl Into<Command>) {
         self.app.apply(command);
     }
 
@@ -75,10 +76,10 @@ impl Workbench {
     ///
     /// # Panics
     /// When no move waits.
-    pub fn allow(&mut self, command: Command) {
+    pub fn allow(&mut self, command: impl Into<Command>) {
         self.click(command);
         self.until("the first move that waits", |model| model.asked.is_some());
-        self.click(Command::ConfirmMove);
+        self.click(motion::Command::ConfirmMove);
     }
 
     /// Waits until the model is like that.

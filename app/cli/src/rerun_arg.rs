@@ -12,6 +12,7 @@ use crate::{Failure, out};
 use handeye_record::{Pace, Recorder, RecorderOptions, RerunChoice, WebViewer, record};
 use handeye_ui::opening::Begin;
 use handeye_workbench::arguments::heading;
+use handeye_workbench::messages;
 use handeye_workbench::model::ViewerState;
 use handeye_workbench::recording::Recording as _;
 use handeye_workbench::text::Language;
@@ -174,7 +175,7 @@ pub fn finish(mut recorder: Recorder, cancel: &CancelToken) -> Result<(), Failur
     recorder.drain(&mut |event| said.push(event));
     let complete = recorder.finish(deadline);
     for event in said {
-        if let handeye_workbench::command::Event::Notice { text, .. } = event {
+        if let handeye_workbench::command::Event::Messages(messages::Event::Notice { text, .. }) = event {
             tracing::warn!("{}", text.say(Language::English));
         }
     }

@@ -28,6 +28,7 @@ use handeye_workbench::command::Command;
 use handeye_workbench::model::{
     Axis, CapturePurpose, CellSource, Drivers, Jog, JogFrame, JogSettings, JogStep, Model, Motion, SolveStatus,
 };
+use handeye_workbench::{capture, connect, export, motion, taught};
 use window::Drawn;
 
 /// Longest wait for anything that a person waits for.
@@ -117,7 +118,7 @@ fn measure(
     way.until("a solution", is_solved)?;
     way.verify(is_typed)?;
     way.until("the solution with its verification", is_solved)?;
-    way.click(Command::Export);
+    way.click(export::Command::Export);
     way.until("the exports", |model| model.export.written.is_some())?;
     let truth = way.hand.ground_truth()?.tip_from_camera;
     let mm = way.error_mm(&truth)?;
@@ -136,7 +137,7 @@ fn captured(model: &Model) -> usize {
 }
 
 impl Way {
-    fn click(&mut self, command: Command) {
+    fn click(&mut self, command: impl Into<Command>) {
         self.drawn.app().apply(command);
     }
 
@@ -157,7 +158,7 @@ impl Way {
 
     fn allow(&mut self) -> anyhow::Result<()> {
         self.until("the robot", |model| model.robot.is_some() && model.mover.is_connected())?;
-        self.click(Command::Arm(true));
+        self.click(connect::Command::Arm(true));
         self.until("the permission", Model::is_armed)
     }
 
@@ -166,10 +167,10 @@ impl Way {
             model.frame.as_ref().is_some_and(|frame| frame.info.base_from_tip.is_some())
         })?;
         self.allow()?;
-        self.click(Command::ImportTaught(reference_poses()));
+        self.click(taught::Command::Import(reference_poses()));
         self.until("the poses", |model| model.taught().len() == CAPTURES)?;
-        self.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
-        self.click(Command::ConfirmMove);
+        self.click(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+        self.click(motion::Command::ConfirmMove);
         if let Some(number) = self.killed.take() {
             self.until("five captures", |model| captured(model) >= 5)?;
             let number = std::fs::read_to_string(number)?;
@@ -177,8 +178,8 @@ impl Way {
             self.until("the end of the sequence", |model| !model.sequence_runs && model.capture.is_none())?;
             self.until("the driver again", |model| model.camera.is_connected() && !model.is_armed())?;
             self.allow()?;
-            self.click(Command::ContinueSequence);
-            self.click(Command::ConfirmMove);
+            self.click(taught::Command::ContinueSequence);
+            self.click(motion::Command::ConfirmMove);
         }
         self.until("ten captures", |model| {
             captured(model) == CAPTURES && !model.sequence_runs && model.motion == Motion::Idle
@@ -219,13 +220,13 @@ impl Way {
             }
             moved.join().map_err(|_panic| anyhow::anyhow!("the hand failed"))?
         })?;
-        self.click(Command::TypePose(shown));
+        self.click(connect::Command::TypePose(shown));
         self.until("the typed pose", |model| model.robot.is_some())
     }
 
     fn capture(&mut self, purpose: CapturePurpose) -> anyhow::Result<()> {
         let before = captured(self.drawn.app().model());
-        self.click(Command::Capture(purpose));
+        self.click(capture::Command::Take(purpose));
         self.until("the capture", |model| captured(model) == before + 1)
     }
 
@@ -240,8 +241,8 @@ impl Way {
                 let axis = [Axis::X, Axis::Y][number % 2];
                 let before = self.drawn.app().model().view.jog;
                 let step = JogStep::Step { metres: 0.02, radians: 0.05 };
-                self.click(Command::SetJog(JogSettings { step, ..before }));
-                self.click(Command::Jog(Jog::Translate { frame: JogFrame::Base, axis, forward: true }));
+                self.click(motion::Command::SetJog(JogSettings { step, ..before }));
+                self.click(motion::Command::Jog(Jog::Translate { frame: JogFrame::Base, axis, forward: true }));
                 self.until("the end of the step", |model| model.motion == Motion::Idle)?;
             }
             self.capture(CapturePurpose::Verify)?;

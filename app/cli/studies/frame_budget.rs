@@ -28,10 +28,10 @@ use handeye_record::RerunChoice;
 use handeye_server::{CellConfig, CellServer};
 use handeye_session::{CaptureId, CaptureRecord, Document};
 use handeye_workbench::app::App;
-use handeye_workbench::command::{Command, Event};
 use handeye_workbench::model::{CellSource, MotionGoal, Observed, SessionState, ViewerState};
 use handeye_workbench::session::start::{self, BOARD};
 use handeye_workbench::text::Text;
+use handeye_workbench::{motion, session};
 use image::RgbImage;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
 use window::Drawn;
@@ -72,9 +72,9 @@ fn main() -> anyhow::Result<()> {
     measure("a move of 30 s", CellSource::Address(cell.endpoint()), duration.max(Duration::from_secs(35)), |app| {
         let mut view = app.model().view.jog;
         view.speed = Some(0.005);
-        app.apply(Command::SetJog(view));
+        app.apply(motion::Command::SetJog(view));
         let goal = MotionGoal::Joints([0.4, 0.3, -0.6, 0.2, 1.2, 0.3].into());
-        app.apply(Command::Move { goal, what: Text::verbatim("a far place") });
+        app.apply(motion::Command::Move { goal, what: Text::verbatim("a far place") });
     })?;
 
     measure("a solve of 1,000 views", CellSource::Address(cell.endpoint()), duration, thousand_views)?;
@@ -220,8 +220,8 @@ fn thousand_views(app: &mut App) {
         ));
     }
     let state = SessionState { folder: None, document: Arc::new(document), undo: None, redo: None };
-    app.absorb(Event::Document(Box::new(state)));
+    app.absorb(session::Event::Document(Box::new(state)));
     for (id, observed) in seen {
-        app.absorb(Event::Observed { id, target: BOARD, observed: Some(Arc::new(observed)) });
+        app.absorb(session::Event::Observed { id, target: BOARD, observed: Some(Arc::new(observed)) });
     }
 }

@@ -113,7 +113,7 @@ fn a_folder_that_cannot_be_written_is_said_once_and_the_work_goes_on() {
     assert!(recorder.finish(SOON));
     let mut words = Vec::new();
     shared.drain(&mut |event| {
-        if let Event::Notice { text, .. } = event {
+        if let Event::Messages(handeye_workbench::messages::Event::Notice { text, .. }) = event {
             words.push(text.say(Language::English));
         }
     });

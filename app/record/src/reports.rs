@@ -7,6 +7,7 @@ use handeye_workbench::command::Event;
 use handeye_workbench::model::{RerunState, Severity, ViewerState};
 use handeye_workbench::text::Text;
 use handeye_workbench::worker::Waker;
+use handeye_workbench::{messages, recording};
 
 /// Events that wait for the window.
 const MAX_EVENTS: usize = 32;
@@ -65,11 +66,12 @@ impl Reports {
 
     /// Something for the user.
     pub fn notice(&self, severity: Severity, text: Text) {
-        self.tell(Event::Notice { severity, text });
+        self.tell(messages::Event::Notice { severity, text });
     }
 
     /// Something that has happened.
-    pub fn tell(&self, event: Event) {
+    pub fn tell(&self, event: impl Into<Event>) {
+        let event = event.into();
         let mut inner = self.inner();
         if inner.events.len() < MAX_EVENTS {
             inner.events.push(event);
@@ -93,6 +95,6 @@ impl Reports {
         }
         let events = std::mem::take(&mut inner.events);
         drop(inner);
-        is_news.then_some(Event::Rerun(now)).into_iter().chain(events).for_each(absorb);
+        is_news.then_some(Event::Recording(recording::Event::Rerun(now))).into_iter().chain(events).for_each(absorb);
     }
 }

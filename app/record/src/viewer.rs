@@ -13,8 +13,8 @@ use super::shared::{Shared, Viewers};
 use super::stream::{SharedSink, Target};
 use super::{browser, native};
 use handeye_wording::text;
-use handeye_workbench::command::Event;
 use handeye_workbench::model::{Severity, ViewerState};
+use handeye_workbench::recording;
 use handeye_workbench::recording::BROWSER_PATH;
 use handeye_workbench::text::Text;
 
@@ -148,7 +148,7 @@ impl Shared {
             };
             self.reports.notice(Severity::Info, text);
             if !opened {
-                self.reports.tell(Event::NoBrowser);
+                self.reports.tell(recording::Event::NoBrowser);
             }
         }
         Ok(())

@@ -19,8 +19,8 @@ use handeye_ui::stop_button::stop_places;
 use handeye_ui::style::theme;
 use handeye_ui::{LEAST_SIZE, SIZE, Window, typed};
 use handeye_workbench::app::InBrowser;
-use handeye_workbench::command::Command;
 use handeye_workbench::motion::grip::{Grip, SILENCE, Times};
+use handeye_workbench::session;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -218,7 +218,7 @@ impl Host {
         }
         self.held.heed(&self.events[before..]);
         for folder in news.opened {
-            self.window.app_mut().apply(Command::Open(folder));
+            self.window.app_mut().apply(session::Command::Open(folder));
             sooner(&self.due, Duration::ZERO);
         }
         let now = Instant::now();

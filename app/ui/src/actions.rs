@@ -9,8 +9,9 @@ use handeye_workbench::model::{
 };
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
-
-use super::shell;
+use handeye_workbench::{
+    by_hand, capture, connect, export, guided, motion, recording, session, shell, solve, taught, track,
+};
 
 /// Headings of the help about the keyboard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,7 +117,11 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
     let has_poses = !model.document().taught.is_empty();
     let has_robot = crate::shell::reasons::needs_robot(model).is_none();
     let run = |name, purpose: Option<CapturePurpose>| {
-        plain(name, Command::RunSequence { purpose }, moves && has_poses && (has_robot || purpose.is_none()))
+        plain(
+            name,
+            taught::Command::RunSequence { purpose }.into(),
+            moves && has_poses && (has_robot || purpose.is_none()),
+        )
     };
     let sequence = model.sequence.as_ref().filter(|_| model.sequence_runs);
     let asks = model.asked.is_some();
@@ -125,18 +130,18 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
     let may_move = model.is_armed();
     let asks_to_move = matches!(model.moves(), Moves::OnceArmed { .. }) && model.control.is_connected();
     let mut all = vec![
-        with(tr!(language, "Stop the arm"), STOP, Command::Stop, true),
-        with(tr!(language, "Capture"), CAPTURE, Command::Capture(CapturePurpose::Calibrate), takes),
-        plain(tr!(language, "Capture for verification"), Command::Capture(CapturePurpose::Verify), takes),
-        plain(tr!(language, "Cancel capture"), Command::CancelCapture, model.capture.is_some()),
+        with(tr!(language, "Stop the arm"), STOP, motion::Command::Stop.into(), true),
+        with(tr!(language, "Capture"), CAPTURE, capture::Command::Take(CapturePurpose::Calibrate).into(), takes),
+        plain(tr!(language, "Capture for verification"), capture::Command::Take(CapturePurpose::Verify).into(), takes),
+        plain(tr!(language, "Cancel capture"), capture::Command::Cancel.into(), model.capture.is_some()),
         plain(
             tr!(language, "Calibrate for me"),
-            Command::CalibrateForMe,
+            guided::Command::CalibrateForMe.into(),
             crate::guided::section::blocked(model, hindrance).is_none() && model.takes_chosen_poses(),
         ),
         plain(
             tr!(language, "Guide me"),
-            Command::GuideByHand,
+            by_hand::Command::Guide.into(),
             takes && hand.is_none() && crate::by_hand::section::blocked(model).is_none(),
         ),
         run(tr!(language, "Capture at each taught pose"), Some(CapturePurpose::Calibrate)),
@@ -144,82 +149,90 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
         run(tr!(language, "Move to each taught pose"), None),
         plain(
             tr!(language, "Verify at planned poses"),
-            Command::VerifyAtPlanned,
+            taught::Command::VerifyAtPlanned.into(),
             moves && model.calibrated().is_some(),
         ),
         plain(
             tr!(language, "Continue the sequence"),
-            Command::ContinueSequence,
+            taught::Command::ContinueSequence.into(),
             moves && model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_some()),
         ),
-        plain(tr!(language, "Stop the sequence"), Command::StopSequence, sequence.is_some()),
+        plain(tr!(language, "Stop the sequence"), taught::Command::StopSequence.into(), sequence.is_some()),
         plain(
             tr!(language, "Move there"),
-            Command::ConfirmMove,
+            motion::Command::ConfirmMove.into(),
             asks && crate::shell::reasons::unmovable(model).is_none() && model.motion == Motion::Idle,
         ),
-        plain(tr!(language, "Skip this pose"), Command::SkipMove, asks),
+        plain(tr!(language, "Skip this pose"), motion::Command::SkipMove.into(), asks),
         plain(
             tr!(language, "Skip this view"),
-            Command::SkipView,
+            by_hand::Command::SkipView.into(),
             hand.is_some_and(|hand| hand.waits == handeye_workbench::by_hand::state::HandWaits::View),
         ),
-        plain(tr!(language, "Stop guiding"), Command::StopGuiding, hand.is_some()),
+        plain(tr!(language, "Stop guiding"), by_hand::Command::StopGuiding.into(), hand.is_some()),
         plain(
             tr!(language, "Home: where the arm stood when the cell was connected"),
-            Command::GoHome,
+            motion::Command::GoHome.into(),
             moves && model.home.is_some(),
         ),
-        plain(tr!(language, "Reset the cell"), Command::ResetCell, model.source.is_built_in() && !model.sequence_runs),
+        plain(
+            tr!(language, "Reset the cell"),
+            connect::Command::ResetCell.into(),
+            model.source.is_built_in() && !model.sequence_runs,
+        ),
         with(
             tr!(language, "Delete the selected captures"),
             DELETE,
-            Command::Delete(model.selection.clone()),
+            session::Command::Delete(model.selection.clone()).into(),
             !model.selection.is_empty(),
         ),
-        plain(tr!(language, "Back to live"), Command::BackToLive, !model.selection.is_empty()),
-        plain(tr!(language, "Teach here"), Command::Teach { name: None }, model.robot.is_some()),
+        plain(tr!(language, "Back to live"), session::Command::BackToLive.into(), !model.selection.is_empty()),
+        plain(tr!(language, "Teach here"), taught::Command::Teach { name: None }.into(), model.robot.is_some()),
         plain(
             tr!(language, "Use the taught poses of another cell here"),
-            Command::AdoptTaught,
+            taught::Command::Adopt.into(),
             sequence.is_none() && model.taught().len() < model.document().taught.len(),
         ),
-        plain(tr!(language, "Reference poses"), Command::TeachReference, sequence.is_none()),
-        plain(tr!(language, "Let the workbench move it"), Command::Arm(true), asks_to_move && !may_move),
-        plain(tr!(language, "Only read the robot"), Command::Arm(false), asks_to_move && may_move),
-        plain(tr!(language, "Solve"), Command::Solve, true),
+        plain(tr!(language, "Reference poses"), taught::Command::TeachReference.into(), sequence.is_none()),
+        plain(
+            tr!(language, "Let the workbench move it"),
+            connect::Command::Arm(true).into(),
+            asks_to_move && !may_move,
+        ),
+        plain(tr!(language, "Only read the robot"), connect::Command::Arm(false).into(), asks_to_move && may_move),
+        plain(tr!(language, "Solve"), solve::Command::Solve.into(), true),
         plain(
             tr!(language, "Cancel solving"),
-            Command::CancelSolve,
+            solve::Command::Cancel.into(),
             matches!(model.solve.status, SolveStatus::Running { .. }),
         ),
         plain(
             tr!(language, "Export the chosen formats"),
-            Command::Export,
+            export::Command::Export.into(),
             crate::export::pane::why_not(model).is_none(),
         ),
         plain(
             tr!(language, "Start tracking"),
-            Command::SetTracking(true),
+            track::Command::SetTracking(true).into(),
             !model.track.on && blocked.tracking.is_none(),
         ),
-        plain(tr!(language, "Stop tracking"), Command::SetTracking(false), model.track.on),
+        plain(tr!(language, "Stop tracking"), track::Command::SetTracking(false).into(), model.track.on),
         plain(
             tr!(language, "Stop following"),
-            Command::SetFollow(None),
+            track::Command::SetFollow(None).into(),
             !matches!(model.track.follow, FollowStatus::Off | FollowStatus::Ended(_)),
         ),
-        plain(tr!(language, "Try to connect now"), Command::Reconnect, true),
+        plain(tr!(language, "Try to connect now"), connect::Command::Reconnect.into(), true),
         plain(
             tr!(language, "Stop trying"),
-            Command::StopTrying,
+            connect::Command::StopTrying.into(),
             matches!(model.source, CellSource::Drivers(_)) && !model.control.is_connected(),
         ),
     ];
     // A robot behind a driver has no simulation.
     if !matches!(model.source, CellSource::Drivers(_)) {
         let rests = model.resting_simulation().is_some();
-        all.push(plain(tr!(language, "Start simulation"), Command::StartSimulation, rests));
+        all.push(plain(tr!(language, "Start simulation"), connect::Command::StartSimulation.into(), rests));
     }
     all
 }
@@ -227,14 +240,19 @@ fn work(model: &Model, language: Language) -> Vec<Action> {
 /// Undo, and the files of the session.
 fn session(model: &Model, language: Language) -> Vec<Action> {
     let with = |name, keys, command, available| action(name, Group::Session, keys, command, available);
-    let dialog = |name, keys, dialog| with(name, keys, Command::SetDialog(Some(dialog)), true);
+    let dialog = |name, keys, dialog| with(name, keys, shell::Command::SetDialog(Some(dialog)).into(), true);
     let facts = handeye_workbench::session::facts::of(model);
     vec![
-        with(tr!(language, "Undo"), UNDO, Command::Undo, facts.undo.is_some()),
-        with(tr!(language, "Redo"), REDO, Command::Redo, facts.redo.is_some()),
+        with(tr!(language, "Undo"), UNDO, session::Command::Undo.into(), facts.undo.is_some()),
+        with(tr!(language, "Redo"), REDO, session::Command::Redo.into(), facts.redo.is_some()),
         dialog(tr!(language, "New session…"), NEW, Dialog::New),
         dialog(tr!(language, "Open session…"), OPEN, Dialog::Open),
-        with(tr!(language, "Open a sample"), &[], Command::OpenSample, !model.opening && !model.sequence_runs),
+        with(
+            tr!(language, "Open a sample"),
+            &[],
+            session::Command::OpenSample.into(),
+            !model.opening && !model.sequence_runs,
+        ),
         dialog(tr!(language, "Save session…"), SAVE, Dialog::SaveAs),
     ]
 }
@@ -243,24 +261,36 @@ fn session(model: &Model, language: Language) -> Vec<Action> {
 fn window(model: &Model, language: Language) -> Vec<Action> {
     let mut all = Vec::new();
     for (step, keys) in Step::ALL.into_iter().zip(STEPS) {
-        all.push(action(shell::step_name(step, language), Group::Steps, keys, Command::GoToStep(step), true));
+        all.push(action(
+            crate::shell::step_name(step, language),
+            Group::Steps,
+            keys,
+            shell::Command::GoToStep(step).into(),
+            true,
+        ));
     }
     let with = |name, keys, command, available| action(name, Group::Window, keys, command, available);
-    let open = |dialog| Command::SetDialog(Some(dialog));
+    let open = |dialog| shell::Command::SetDialog(Some(dialog)).into();
     all.extend([
         with(tr!(language, "All commands"), PALETTE, open(Dialog::Palette), true),
         with(tr!(language, "Keyboard"), KEYS, open(Dialog::Help), true),
-        with(tr!(language, "Light theme"), &[], Command::SetTheme(ThemeChoice::Light), true),
-        with(tr!(language, "Dark theme"), &[], Command::SetTheme(ThemeChoice::Dark), true),
-        with(tr!(language, "Reset layout"), &[], Command::ResetLayout, true),
-        with(tr!(language, "Open the recording in Rerun"), &[], Command::OpenRerun, model.rerun.on),
+        with(tr!(language, "Light theme"), &[], shell::Command::SetTheme(ThemeChoice::Light).into(), true),
+        with(tr!(language, "Dark theme"), &[], shell::Command::SetTheme(ThemeChoice::Dark).into(), true),
+        with(tr!(language, "Reset layout"), &[], shell::Command::ResetLayout.into(), true),
+        with(tr!(language, "Open the recording in Rerun"), &[], recording::Command::OpenRerun.into(), model.rerun.on),
         with(tr!(language, "About"), &[], open(Dialog::About), true),
     ]);
     for other in Language::ALL {
-        all.push(with(other.own_name(), &[], Command::SetLanguage(other), true));
+        all.push(with(other.own_name(), &[], shell::Command::SetLanguage(other).into(), true));
     }
     for pane in Pane::ALL {
-        all.push(action(shell::panes::title(pane, language), Group::Panes, &[], Command::ShowPane(pane), true));
+        all.push(action(
+            crate::shell::panes::title(pane, language),
+            Group::Panes,
+            &[],
+            shell::Command::ShowPane(pane).into(),
+            true,
+        ));
     }
     all
 }
@@ -313,8 +343,6 @@ pub fn pressed(ctx: &egui::Context, model: &Model) -> Vec<Command> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use strum::IntoEnumIterator as _;
-
     use super::*;
     use handeye_workbench::command::CommandKind;
     use handeye_workbench::model::{CellSource, ViewSettings};
@@ -322,66 +350,81 @@ mod tests {
     /// Commands with a value that only the place has where it is chosen: a pose in a row, a number that is typed, a point of an
     /// image, a file, a key that is held.
     const ONLY_IN_PLACE: &[CommandKind] = {
-        use CommandKind::*;
+        use handeye_workbench::capture::command::CommandKind as Capture;
+        use handeye_workbench::connect::command::CommandKind as Connect;
+        use handeye_workbench::export::command::CommandKind as Export;
+        use handeye_workbench::import::command::CommandKind as Import;
+        use handeye_workbench::keep_out::command::CommandKind as KeepOut;
+        use handeye_workbench::live::command::CommandKind as Live;
+        use handeye_workbench::messages::command::CommandKind as Messages;
+        use handeye_workbench::motion::command::CommandKind as Motion;
+        use handeye_workbench::scene::command::CommandKind as Scene;
+        use handeye_workbench::session::command::CommandKind as Session;
+        use handeye_workbench::shell::command::CommandKind as Shell;
+        use handeye_workbench::solve::command::CommandKind as Solve;
+        use handeye_workbench::target::command::CommandKind as Target;
+        use handeye_workbench::taught::command::CommandKind as Taught;
+        use handeye_workbench::track::command::CommandKind as Track;
+
         &[
-            ChooseFormats,
-            ChooseHypothesis,
-            Connect,
-            ConvertRecording,
-            ConvertImages,
-            DismissMessage,
-            ExportKeepOut,
-            ExportTaught,
-            FixConvention,
-            GoToCapture,
-            GoToTaught,
-            HideBoard,
-            ImportKeepOut,
-            ImportTaught,
-            Jog,
-            JogHeld,
-            JogReleased,
-            ListFolder,
-            Move,
-            MoveBoard,
-            NewSession,
-            Open,
-            OpenFolder,
-            Pick,
-            PointAt,
-            PrintTarget,
-            RemoveTaught,
-            RenameTaught,
-            ReorderTaught,
-            SaveAs,
-            Select,
-            SetCamera,
-            SetCaptureOptions,
-            SetConfirmMoves,
-            SetDepthColours,
-            SetDepthScale,
-            SetExcluded,
-            SetExportFolder,
-            SetExportNames,
-            SetGoal,
-            SetImportTarget,
-            SetImportTime,
-            SetJog,
-            SetKeepOut,
-            SetKeepOutliers,
-            SetMethod,
-            SetMode,
-            SetObjects,
-            SetOutlierLine,
-            SetOverlays,
-            SetPurpose,
-            SetRotationFormat,
-            SetSceneView,
-            SetTarget,
-            SetTipBox,
-            SetViewport,
-            ShowFormat,
-            TypePose,
+            CommandKind::Capture(Capture::SetOptions),
+            CommandKind::Connect(Connect::Connect),
+            CommandKind::Connect(Connect::SetObjects),
+            CommandKind::Connect(Connect::TypePose),
+            CommandKind::Export(Export::ChooseFormats),
+            CommandKind::Export(Export::SetFolder),
+            CommandKind::Export(Export::SetNames),
+            CommandKind::Export(Export::ShowFormat),
+            CommandKind::Import(Import::ChooseHypothesis),
+            CommandKind::Import(Import::ConvertImages),
+            CommandKind::Import(Import::ConvertRecording),
+            CommandKind::Import(Import::FixConvention),
+            CommandKind::Import(Import::SetTarget),
+            CommandKind::Import(Import::SetTime),
+            CommandKind::KeepOut(KeepOut::Export),
+            CommandKind::KeepOut(KeepOut::Import),
+            CommandKind::KeepOut(KeepOut::Set),
+            CommandKind::Live(Live::Pick),
+            CommandKind::Live(Live::PointAt),
+            CommandKind::Live(Live::SetDepthColours),
+            CommandKind::Live(Live::SetDepthScale),
+            CommandKind::Live(Live::SetOverlays),
+            CommandKind::Live(Live::SetViewport),
+            CommandKind::Messages(Messages::Dismiss),
+            CommandKind::Motion(Motion::GoToCapture),
+            CommandKind::Motion(Motion::Jog),
+            CommandKind::Motion(Motion::JogHeld),
+            CommandKind::Motion(Motion::JogReleased),
+            CommandKind::Motion(Motion::Move),
+            CommandKind::Motion(Motion::SetConfirmMoves),
+            CommandKind::Motion(Motion::SetJog),
+            CommandKind::Scene(Scene::SetView),
+            CommandKind::Session(Session::ListFolder),
+            CommandKind::Session(Session::New),
+            CommandKind::Session(Session::Open),
+            CommandKind::Session(Session::OpenFolder),
+            CommandKind::Session(Session::SaveAs),
+            CommandKind::Session(Session::Select),
+            CommandKind::Session(Session::SetCamera),
+            CommandKind::Session(Session::SetExcluded),
+            CommandKind::Session(Session::SetMode),
+            CommandKind::Session(Session::SetPurpose),
+            CommandKind::Shell(Shell::SetRotationFormat),
+            CommandKind::Solve(Solve::SetGoal),
+            CommandKind::Solve(Solve::SetKeepOutliers),
+            CommandKind::Solve(Solve::SetMethod),
+            CommandKind::Solve(Solve::SetOutlierLine),
+            CommandKind::Solve(Solve::SetTipBox),
+            CommandKind::Target(Target::Print),
+            CommandKind::Target(Target::Set),
+            CommandKind::Taught(Taught::Export),
+            CommandKind::Taught(Taught::GoTo),
+            CommandKind::Taught(Taught::Import),
+            CommandKind::Taught(Taught::Remove),
+            CommandKind::Taught(Taught::Rename),
+            CommandKind::Taught(Taught::Reorder),
+            CommandKind::Track(Track::HideBoard),
+            CommandKind::Track(Track::MoveBoard),
         ]
     };
 
@@ -390,7 +433,7 @@ mod tests {
         let model = Model::new(CellSource::default(), ViewSettings::default());
         let there: BTreeSet<_> =
             all(&model, Language::English).iter().map(|it| CommandKind::from(&it.command)).collect();
-        for kind in CommandKind::iter() {
+        for kind in CommandKind::all() {
             let elsewhere = ONLY_IN_PLACE.contains(&kind);
             assert_ne!(there.contains(&kind), elsewhere, "{kind:?}: in the palette, or listed here with what it needs");
         }

@@ -11,10 +11,10 @@ use super::waker::waker_of;
 use super::window::{Remembered, Window};
 use super::{GuiArgs, widget_list};
 use handeye_workbench::app::{App, Connect, InBrowser, Start};
-use handeye_workbench::command::Event;
 use handeye_workbench::model::{CellSource, Drivers};
 use handeye_workbench::settings::{self, Settings, SettingsFile, Warning};
 use handeye_workbench::worker::Clock;
+use handeye_workbench::{messages, session};
 
 /// Name of the file of boxes beside the settings.
 const KEEP_OUT_FILE: &str = "keep_out.toml";
@@ -107,9 +107,9 @@ impl Opening {
         };
         let mut app = App::start(start, connect, clock, waker)?;
         begin(&mut app)?;
-        app.absorb(Event::Recent(remembered.recent));
+        app.absorb(session::Event::Recent(remembered.recent));
         for warning in warnings {
-            app.absorb(warning.into());
+            app.absorb(messages::Event::from(warning));
         }
         if let Some(file) = variable(widget_list::VARIABLE) {
             ctx.add_plugin(widget_list::WidgetList::new(file.into()));

@@ -10,6 +10,7 @@ use super::dialogs;
 use super::style::theme::{CAPTION, Palette};
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::Model;
+use handeye_workbench::shell;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -54,11 +55,11 @@ impl CommandPalette {
         let choice = if enter { Some(self.chosen) } else { clicked };
         if let Some(action) = choice.and_then(|index| found.get(index)) {
             if action.available {
-                outbox.send(Command::SetDialog(None));
+                outbox.send(shell::Command::SetDialog(None));
                 outbox.send(action.command.clone());
             }
         } else if outside {
-            outbox.send(Command::SetDialog(None));
+            outbox.send(shell::Command::SetDialog(None));
         }
     }
 
@@ -123,7 +124,9 @@ fn found(model: &Model, language: Language, typed: &str) -> Vec<Action> {
     let mut found: Vec<_> = actions::all(model, language)
         .into_iter()
         .zip(english)
-        .filter(|(action, _)| action.command != Command::SetDialog(Some(handeye_workbench::model::Dialog::Palette)))
+        .filter(|(action, _)| {
+            action.command != Command::Shell(shell::Command::SetDialog(Some(handeye_workbench::model::Dialog::Palette)))
+        })
         .filter_map(|(action, english)| {
             let score = fit(action.name, typed).into_iter().chain(fit(english.name, typed)).max()?;
             Some((score, action))

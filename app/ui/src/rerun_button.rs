@@ -4,8 +4,9 @@ use egui::{Button, RichText, Ui};
 
 use crate::style::theme::{self, Palette};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{RerunState, ViewerState};
+use handeye_workbench::recording;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -40,7 +41,7 @@ pub fn rerun_button_ui(ui: &mut Ui, rerun: &RerunState, language: Language, outb
         });
     }
     if response.clicked() {
-        outbox.send(Command::OpenRerun);
+        outbox.send(recording::Command::OpenRerun);
     }
 }
 
@@ -75,6 +76,7 @@ fn hint_ui(ui: &mut Ui, rerun: &RerunState, language: Language) {
 mod tests {
     use super::*;
     use crate::testing::driven::Driven;
+    use handeye_workbench::command::Command;
     use handeye_workbench::model::Model;
     use handeye_workbench::testing::sample;
 
@@ -87,7 +89,7 @@ mod tests {
         let mut model = sample::captured();
         model.rerun.on = true;
         let mut bar = Driven::new(button_ui, model);
-        assert_eq!(bar.click("Rerun"), [Command::OpenRerun]);
+        assert_eq!(bar.click("Rerun"), [Command::Recording(recording::Command::OpenRerun)]);
         bar.model().rerun.on = false;
         bar.steps();
         assert!(!bar.is_enabled("Rerun"));

@@ -14,6 +14,7 @@ use handeye_geometry::testing::{Need, skip};
 
 use super::testing::Silent;
 use handeye_workbench::model::{CellSource, LinkState, Model, Pane, Step, ThemeChoice, ViewSettings};
+use handeye_workbench::shell;
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
 
@@ -83,7 +84,7 @@ fn looks_like(name: &str, theme: ThemeChoice, language: Language, state: State) 
     model.sessions = "/home/me/handeye-sessions".into();
     silent.show_model(model);
     if let Some(step) = step {
-        silent.command(handeye_workbench::command::Command::GoToStep(step));
+        silent.command(shell::Command::GoToStep(step));
     }
     for &pane in panes {
         silent.show(pane);

@@ -12,7 +12,6 @@ use super::actions;
 use super::arrival::{Arrival, Busy};
 use super::dialogs;
 use super::palette::CommandPalette;
-use super::shell;
 use super::shell::layout::Layout;
 #[cfg(feature = "window")]
 use super::shell::layout::STORAGE_KEY;
@@ -29,6 +28,7 @@ use handeye_workbench::model::{
     CaptureOptions, Dialog, Goal, JogSettings, Model, Overlays, RecentSession, ThemeChoice, ViewSettings,
 };
 use handeye_workbench::settings::SettingsFile;
+use handeye_workbench::{motion, recording, session, shell};
 
 /// Redraws at least this often, because ages and durations are shown.
 const CLOCK_PERIOD: Duration = Duration::from_millis(250);
@@ -150,7 +150,7 @@ impl Window {
         let model = app.model();
         textures.live.update(ui.ctx(), model);
         let in_front = layout.in_front();
-        shell::all_ui(ui, model, textures, layout, outbox);
+        crate::shell::all_ui(ui, model, textures, layout, outbox);
         if layout.in_front() != in_front {
             arrival.chosen();
         }
@@ -170,12 +170,12 @@ impl Window {
     /// closes a menu is not to end a sequence without knowing, and who stops an arm does not look at menus.
     fn keyboard(&mut self, ctx: &egui::Context) {
         if ctx.input(|input| input.key_pressed(actions::STOP_KEY)) {
-            self.outbox.send(Command::Stop);
+            self.outbox.send(motion::Command::Stop);
             if self.app.model().is_under_way() {
                 let stops = |event: &egui::Event| matches!(event, egui::Event::Key { key: actions::STOP_KEY, .. });
                 ctx.input_mut(|input| input.events.retain(|event| !stops(event)));
             } else if self.app.model().dialog.is_some() {
-                self.outbox.send(Command::SetDialog(None));
+                self.outbox.send(shell::Command::SetDialog(None));
             }
         }
         if self.app.model().dialog.is_none() {
@@ -201,7 +201,7 @@ impl Window {
     fn dropped(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.last().map(|file| file.path().to_path_buf()));
         if let Some(folder) = dropped {
-            self.outbox.send(Command::Open(folder));
+            self.outbox.send(session::Command::Open(folder));
         }
     }
 
@@ -211,10 +211,12 @@ impl Window {
             tracing::trace!(?command, %place, "command");
             match command {
                 // A browser has the file manager of another machine.
-                Command::OpenFolder(folder) if self.app.model().in_browser => ctx.open_url(download(&folder)),
-                Command::OpenRerun if self.app.model().in_browser => {
+                Command::Session(session::Command::OpenFolder(folder)) if self.app.model().in_browser => {
+                    ctx.open_url(download(&folder))
+                }
+                Command::Recording(recording::Command::OpenRerun) if self.app.model().in_browser => {
                     ctx.open_url(egui::OpenUrl::new_tab(handeye_workbench::recording::BROWSER_PATH));
-                    self.apply(Command::OpenRerun);
+                    self.apply(recording::Command::OpenRerun);
                 }
                 command => self.apply(command),
             }
@@ -226,19 +228,20 @@ impl Window {
     }
 
     /// Does what concerns the window; the rest is for the application.
-    pub(super) fn apply(&mut self, command: Command) {
+    pub(super) fn apply(&mut self, command: impl Into<Command>) {
+        let command = command.into();
         match command {
-            Command::GoToStep(step) => {
+            Command::Shell(shell::Command::GoToStep(step)) => {
                 self.arrival.chosen();
                 self.layout.go_to(step);
                 self.app.apply(command);
             }
-            Command::ShowPane(pane) => {
+            Command::Shell(shell::Command::ShowPane(pane)) => {
                 self.arrival.chosen();
                 self.layout.show(pane);
             }
-            Command::ResetLayout => self.layout = Layout::default(),
-            Command::SetDialog(_) => {
+            Command::Shell(shell::Command::ResetLayout) => self.layout = Layout::default(),
+            Command::Shell(shell::Command::SetDialog(_)) => {
                 self.palette = CommandPalette::default();
                 self.app.apply(command);
             }

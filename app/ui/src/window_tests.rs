@@ -14,6 +14,7 @@ use handeye_workbench::model::{
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
+use handeye_workbench::{connect, live, messages, motion, session, shell};
 
 #[test]
 fn every_state_of_the_connection_says_what_goes_on() {
@@ -39,15 +40,15 @@ fn a_lost_connection_says_since_when_and_why_and_keeps_the_last_image() {
     let mut silent = Silent::live();
     let why = Text::verbatim("the cable is out");
     let lost = LinkState::Lost { since_s: 88.0, why: why.clone(), attempt: 0, next_s: 100.0 };
-    silent.absorb(Event::Link { link: Link::Camera, state: lost });
+    silent.absorb(connect::Event::Link { link: Link::Camera, state: lost });
     assert!(silent.sees("Camera connection lost 12 s ago"));
     assert!(silent.sees("The cable is out."));
     assert!(silent.harness.query_by_label("Colour image").is_some());
     let retrying = LinkState::Retrying { since_s: 88.0, why: why.clone(), attempt: 2 };
-    silent.absorb(Event::Link { link: Link::Camera, state: retrying });
+    silent.absorb(connect::Event::Link { link: Link::Camera, state: retrying });
     assert!(silent.sees("retrying"));
     let later = LinkState::Lost { since_s: 95.0, why, attempt: 0, next_s: 100.0 };
-    silent.absorb(Event::Link { link: Link::Control, state: later });
+    silent.absorb(connect::Event::Link { link: Link::Control, state: later });
     assert!(silent.sees("Connection lost 12 s ago"), "the first loss counts");
 }
 
@@ -126,7 +127,7 @@ fn the_pixel_under_the_pointer_is_read_from_both_images() {
 #[test]
 fn a_pixel_without_surface_has_no_made_up_depth() {
     let mut silent = Silent::live();
-    silent.app().apply(Command::PointAt(Some(ImagePoint { column: 0, row: 0 })));
+    silent.app().apply(live::Command::PointAt(Some(ImagePoint { column: 0, row: 0 })));
     // Before the next frame of the window takes the pointer away again.
     silent.harness.step();
     assert!(silent.sees("Depth over 3.50 m"));
@@ -179,10 +180,10 @@ fn theme_and_language_are_switched_in_the_menu_at_once() {
 #[test]
 fn a_simulation_that_rests_can_be_started() {
     let mut silent = Silent::live();
-    silent.absorb(Event::Robot(robot(Simulation::Stopped)));
+    silent.absorb(connect::Event::Robot(robot(Simulation::Stopped)));
     assert!(silent.sees("The simulation is stopped"));
     assert!(silent.harness.query_by_label("Start simulation").is_some());
-    silent.absorb(Event::Robot(robot(Simulation::Running)));
+    silent.absorb(connect::Event::Robot(robot(Simulation::Running)));
     assert!(!silent.sees("The simulation is stopped"));
 }
 
@@ -199,9 +200,9 @@ fn an_image_is_uploaded_once_however_often_the_window_is_drawn() {
 fn images_that_no_longer_come_are_not_counted_as_a_frame_rate() {
     let mut silent = Silent::live();
     assert!(silent.sees("20 fps"));
-    let Event::Frame { mut info, dropped, images } = frame(2) else { unreachable!() };
+    let Event::Live(live::Event::Frame { mut info, dropped, images }) = frame(2) else { unreachable!() };
     info.received_s = 95.0;
-    silent.absorb(Event::Frame { info, dropped, images });
+    silent.absorb(live::Event::Frame { info, dropped, images });
     assert!(silent.sees("no new images"));
     assert!(silent.sees("Image age: 5.0 s"));
 }
@@ -211,17 +212,17 @@ fn nothing_is_cut_off_at_the_smallest_size() {
     let size = vec2(1024.0, 700.0);
     let mut silent = Silent::of_size(CellSource::default(), size);
     silent.links(&connected());
-    silent.absorb(Event::Robot(robot(Simulation::Running)));
+    silent.absorb(connect::Event::Robot(robot(Simulation::Running)));
     silent.absorb(frame(1));
     for language in Language::ALL {
-        silent.command(Command::SetLanguage(language));
-        silent.command(Command::SetRotationFormat(RotationFormat::Quaternion));
+        silent.command(shell::Command::SetLanguage(language));
+        silent.command(shell::Command::SetRotationFormat(RotationFormat::Quaternion));
         let tr =
             |english| handeye_workbench::text::Catalogue::translation(language, english).unwrap_or(english).to_owned();
         let mut labels: Vec<_> =
             ["STOP", "Menu", "Undo", "Redo", "Full range", "Colour image", "Depth image"].into_iter().map(tr).collect();
         labels.push(format!("{}: 0.0 s", tr("Image age")));
-        labels.extend(Pane::ALL.map(|pane| shell::panes::title(pane, language).to_owned()));
+        labels.extend(Pane::ALL.map(|pane| crate::shell::panes::title(pane, language).to_owned()));
         for label in labels {
             let nodes: Vec<_> = silent.harness.query_all_by_label(&label).collect();
             assert!(!nodes.is_empty(), "{label} is not there");
@@ -255,9 +256,9 @@ fn a_step_brings_its_panes_to_the_front_by_click_and_by_key() {
     }
     silent.press(egui::Modifiers::NONE, egui::Key::Num2);
     assert!(silent.harness.state_mut().layout().is_in_front(Pane::Target));
-    silent.command(Command::GoToStep(Step::Capture));
+    silent.command(shell::Command::GoToStep(Step::Capture));
     assert!(silent.harness.state_mut().layout().is_in_front(Pane::Jog));
-    silent.command(Command::ResetLayout);
+    silent.command(shell::Command::ResetLayout);
     assert!(silent.harness.state_mut().layout().is_in_front(Pane::Connect));
 }
 
@@ -267,7 +268,7 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
     silent.press(egui::Modifiers::NONE, egui::Key::Escape);
     assert!(silent.app().model().stop_pending);
 
-    silent.absorb(Event::Stopped);
+    silent.absorb(motion::Event::Stopped);
     silent.click("CoppeliaSim");
     silent.harness.get_by_label("Address of the cell").focus();
     silent.steps();
@@ -275,8 +276,8 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
     silent.press(egui::Modifiers::NONE, egui::Key::Escape);
     assert!(silent.app().model().stop_pending);
 
-    silent.absorb(Event::Stopped);
-    silent.command(Command::SetDialog(Some(Dialog::Help)));
+    silent.absorb(motion::Event::Stopped);
+    silent.command(shell::Command::SetDialog(Some(Dialog::Help)));
     assert!(silent.sees("Esc stops the arm at any time"));
     silent.press(egui::Modifiers::NONE, egui::Key::Escape);
     assert!(silent.app().model().stop_pending);
@@ -287,7 +288,7 @@ fn esc_stops_the_arm_while_text_is_typed_and_while_a_dialog_is_open() {
 #[test]
 fn what_says_why_images_are_not_live_moves_nothing_that_moves_the_arm() {
     let mut silent = Silent::live();
-    silent.absorb(Event::Link { link: Link::Motion, state: connected() });
+    silent.absorb(connect::Event::Link { link: Link::Motion, state: connected() });
     for (pane, names) in
         [(Pane::Jog, ["Jog joint 1 +", "Stop"].as_slice()), (Pane::Taught, &["STOP"]), (Pane::Verify, &["STOP"])]
     {
@@ -297,10 +298,10 @@ fn what_says_why_images_are_not_live_moves_nothing_that_moves_the_arm() {
         };
         let before = places(&silent);
         let lost = LinkState::Lost { since_s: 88.0, why: Text::verbatim("gone"), attempt: 0, next_s: 100.0 };
-        silent.absorb(Event::Link { link: Link::Camera, state: lost });
+        silent.absorb(connect::Event::Link { link: Link::Camera, state: lost });
         assert!(silent.sees("Camera connection lost 12 s ago"));
         assert_eq!(places(&silent), before, "{pane:?}");
-        silent.absorb(Event::Link { link: Link::Camera, state: connected() });
+        silent.absorb(connect::Event::Link { link: Link::Camera, state: connected() });
     }
 }
 
@@ -329,8 +330,8 @@ fn esc_stops_what_is_under_way_and_leaves_open_what_is_open() {
     let mut silent = Silent::live();
     let opened: [Open<'_>; 3] = [
         ("New session…", &|silent| silent.click("Menu")),
-        ("Esc stops the arm at any time", &|silent| silent.command(Command::SetDialog(Some(Dialog::Help)))),
-        ("Type a command", &|silent| silent.command(Command::SetDialog(Some(Dialog::Palette)))),
+        ("Esc stops the arm at any time", &|silent| silent.command(shell::Command::SetDialog(Some(Dialog::Help)))),
+        ("Type a command", &|silent| silent.command(shell::Command::SetDialog(Some(Dialog::Palette)))),
     ];
     for (shown, open) in opened {
         let mut model = silent.app().model().clone();
@@ -343,7 +344,7 @@ fn esc_stops_what_is_under_way_and_leaves_open_what_is_open() {
         silent.press(egui::Modifiers::NONE, egui::Key::Escape);
         assert!(silent.app().model().stop_pending, "{shown}");
         assert!(silent.sees(shown), "{shown}: it is closed as well");
-        silent.absorb(Event::Stopped);
+        silent.absorb(motion::Event::Stopped);
         silent.press(egui::Modifiers::NONE, egui::Key::Escape);
         assert!(!silent.sees(shown), "{shown}: nothing is left to stop");
     }
@@ -388,7 +389,7 @@ fn the_help_lists_the_keys_that_work() {
 fn an_error_stays_on_the_screen_until_it_is_put_aside_and_then_in_the_log() {
     let mut silent = Silent::live();
     let text = handeye_workbench::text::Text::verbatim("the lens cap is on");
-    silent.absorb(Event::Notice { severity: handeye_workbench::model::Severity::Error, text });
+    silent.absorb(messages::Event::Notice { severity: handeye_workbench::model::Severity::Error, text });
     assert_eq!(silent.harness.query_all_by_label("the lens cap is on").count(), 1, "below the steps and nowhere else");
     let all = silent.app().model().messages.iter().len();
     for _ in 0..all {
@@ -450,12 +451,12 @@ fn texts(shape: &egui::Shape, found: &mut Vec<String>) {
 fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
     let mut silent = Silent::live();
     let alphabet = alphabet(&silent);
-    let dialogs = [Dialog::Help, Dialog::About, Dialog::Palette].map(|dialog| Command::SetDialog(Some(dialog)));
-    let views: Vec<_> = Pane::ALL.map(Command::ShowPane).into_iter().chain(dialogs).collect();
+    let dialogs = [Dialog::Help, Dialog::About, Dialog::Palette].map(|dialog| shell::Command::SetDialog(Some(dialog)));
+    let views: Vec<_> = Pane::ALL.map(shell::Command::ShowPane).into_iter().chain(dialogs).collect();
     for language in Language::ALL {
         for theme in [ThemeChoice::Dark, ThemeChoice::Light] {
-            silent.command(Command::SetLanguage(language));
-            silent.command(Command::SetTheme(theme));
+            silent.command(shell::Command::SetLanguage(language));
+            silent.command(shell::Command::SetTheme(theme));
             for view in &views {
                 silent.command(view.clone());
                 let mut found = Vec::new();
@@ -464,7 +465,7 @@ fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
                 for text in found {
                     assert_eq!(missing(&alphabet, &text), "", "{view:?} {language:?}: {text}");
                 }
-                silent.command(Command::SetDialog(None));
+                silent.command(shell::Command::SetDialog(None));
             }
         }
     }
@@ -572,9 +573,9 @@ fn the_board_counts_as_in_view_until_it_was_not_found_for_a_while() {
     silent.show_model(model);
     let is_in_view = |silent: &Silent| silent.sees("(Board in view)");
     assert!(!is_in_view(&silent));
-    silent.absorb(Event::Detection(Box::new(detection.clone())));
+    silent.absorb(live::Event::Detection(Box::new(detection.clone())));
     detection.corners = None;
-    silent.absorb(Event::Detection(Box::new(detection)));
+    silent.absorb(live::Event::Detection(Box::new(detection)));
     assert!(is_in_view(&silent), "a blurred image says nothing");
     let mut model = silent.app().model().clone();
     model.board_seen_s = Some(now_s - 2.0);
@@ -587,12 +588,12 @@ fn exports_of_the_captures_that_are_there_are_done_and_others_are_not() {
     let mut silent = Silent::live();
     silent.show_model(handeye_workbench::testing::sample::solved());
     assert!(!silent.sees("(Files written)"));
-    silent.absorb(Event::SessionOpened { exported: true });
+    silent.absorb(session::Event::Opened { exported: true });
     assert!(silent.sees("(Files written)"));
     let mut state = silent.app().model().session.clone();
     let mut document = (*state.document).clone();
     document.captures[0].excluded = true;
     state.document = Arc::new(document);
-    silent.absorb(Event::Document(Box::new(state)));
+    silent.absorb(session::Event::Document(Box::new(state)));
     assert!(!silent.app().model().export.is_present, "another answer comes of these captures");
 }

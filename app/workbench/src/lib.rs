@@ -25,6 +25,7 @@ pub mod sample;
 pub mod scene;
 pub mod session;
 pub mod settings;
+pub mod shell;
 pub mod solve;
 pub mod target;
 pub mod taught;

@@ -13,7 +13,7 @@ use handeye_geometry::depth::ColourMap;
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, ValueDeserializer};
 
-use crate::command::Event;
+use crate::messages;
 use crate::model::{CellSource, DepthScale, Drivers, RotationFormat, Severity, ThemeChoice, ViewSettings};
 use crate::text::{Language, Text};
 use handeye_wording::text;
@@ -85,7 +85,7 @@ impl From<Language> for LanguageChoice {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning(pub Text);
 
-impl From<Warning> for Event {
+impl From<Warning> for messages::Event {
     fn from(Warning(text): Warning) -> Self {
         Self::Notice { severity: Severity::Warning, text }
     }

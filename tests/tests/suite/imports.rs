@@ -8,9 +8,9 @@ use handeye_dataset::Dataset;
 use handeye_geometry::testing::{data_folder, python};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::workspace_root;
-use handeye_workbench::command::Command as AppCommand;
 use handeye_workbench::model::{CellSource, Dialog, Model};
 use handeye_workbench::text::Language;
+use handeye_workbench::{import, session};
 use nalgebra::Matrix4;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -327,19 +327,19 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     let sessions = home.path().join("sessions");
     let mut bench = Workbench::start(CellSource::default(), &sessions, None);
     let import = |model: &Model| model.import.clone().filter(|import| import.work.is_none());
-    bench.click(AppCommand::Open(folder.clone()));
+    bench.click(session::Command::Open(folder.clone()));
     bench.until("the question for the target", |model| import(model).is_some_and(|import| import.trouble.is_some()));
     assert_eq!(bench.model().dialog, Some(Dialog::Import));
     let why = import(bench.model()).and_then(|import| import.trouble).expect("a reason").say(Language::English);
     assert!(why.contains("11 × 8 inner corners"), "what is in sight is said: {why}");
-    bench.click(AppCommand::SetImportTarget("11x8x20".to_owned()));
+    bench.click(import::Command::SetTarget("11x8x20".to_owned()));
     let hypotheses =
         |model: &Model| import(model).and_then(|import| import.found).map_or(0, |it| it.hypotheses().len());
     bench.until("hypotheses", |model| hypotheses(model) > 0);
     assert_eq!(import(bench.model()).expect("open").chosen, None, "both places of the camera explain it");
-    bench.click(AppCommand::FixConvention { key: "mode".to_owned(), value: Some("eye_in_hand".to_owned()) });
+    bench.click(import::Command::FixConvention { key: "mode".to_owned(), value: Some("eye_in_hand".to_owned()) });
     bench.until("the one that is left", |model| import(model).is_some_and(|import| import.chosen == Some(0)));
-    bench.click(AppCommand::ConvertRecording);
+    bench.click(import::Command::ConvertRecording);
     bench.until("the session", |model| model.document().captures.len() == 20 && model.dialog.is_none());
     bench.until("a solution", |model| model.solve.fresh && model.solve.solved.is_some());
     let session = bench.model().session.folder.clone().expect("on the disk");
@@ -362,7 +362,7 @@ fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_
     }
     let mut bench = Workbench::start(CellSource::default(), &sessions, None);
     let import = |model: &Model| model.import.clone().filter(|import| import.work.is_none());
-    bench.click(AppCommand::Open(folder.clone()));
+    bench.click(session::Command::Open(folder.clone()));
     bench.until("what is there", |model| import(model).is_some_and(|import| import.trouble.is_some()));
     let found = import(bench.model()).and_then(|import| import.found).expect("images");
     let notes: Vec<String> =
@@ -371,9 +371,9 @@ fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_
         notes.iter().any(|note| note.contains("10 × 7 inner corners in 12")),
         "what is in sight is said: {notes:?}"
     );
-    bench.click(AppCommand::SetImportTarget("10x7x15".to_owned()));
+    bench.click(import::Command::SetTarget("10x7x15".to_owned()));
     bench.until("the target", |model| import(model).and_then(|it| it.found).is_some_and(|it| it.target().is_some()));
-    bench.click(AppCommand::ConvertImages);
+    bench.click(import::Command::ConvertImages);
     bench.until("the session", |model| model.document().captures.len() == 12 && model.dialog.is_none());
     bench.until("a solution", |model| model.solve.fresh && model.solve.solved.is_some());
     let session = bench.model().session.folder.clone().expect("on the disk");

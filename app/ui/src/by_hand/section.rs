@@ -7,8 +7,9 @@ use crate::guided::section::error_ui;
 use crate::style::parts;
 use crate::style::theme::Palette;
 use handeye_wording::text;
+use handeye_workbench::by_hand;
 use handeye_workbench::by_hand::state::{ByHand, HandWaits};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
@@ -24,7 +25,7 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
          itself when the view is good enough and the robot stands still"
     );
     if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
-        outbox.send(Command::GuideByHand);
+        outbox.send(by_hand::Command::Guide);
     }
 }
 
@@ -58,10 +59,10 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, hand: &ByHand, outbox: &mut Outbo
         let what = tr!(language, "Leaves this view and those near it out, and asks for another one");
         let button = ui.add_enabled(hand.waits == HandWaits::View, Button::new(tr!(language, "Skip this view")));
         if button.on_hover_text(what).clicked() {
-            outbox.send(Command::SkipView);
+            outbox.send(by_hand::Command::SkipView);
         }
         if ui.button(tr!(language, "Stop guiding")).clicked() {
-            outbox.send(Command::StopGuiding);
+            outbox.send(by_hand::Command::StopGuiding);
         }
     });
 }

@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 
 use super::section::{begin_ui, progress_ui};
 use crate::testing::driven::Driven;
+use handeye_workbench::by_hand;
 use handeye_workbench::by_hand::state::{ByHand, HandWaits};
 use handeye_workbench::command::Command;
 use handeye_workbench::model::Model;
@@ -47,7 +48,7 @@ fn deviation() -> Deviation {
 fn it_begins_with_the_board_in_view_and_needs_no_arm_that_is_driven() {
     let mut model = ready();
     model.cell.iter_mut().for_each(|cell| cell.arm = None);
-    assert_eq!(pane(model).click("Guide me"), [Command::GuideByHand]);
+    assert_eq!(pane(model).click("Guide me"), [Command::ByHand(by_hand::Command::Guide)]);
     let mut unseen = sample::connected();
     unseen.board_seen_s = None;
     assert!(!pane(unseen).is_enabled("Guide me"), "there is no board to begin with");
@@ -58,8 +59,8 @@ fn what_to_change_is_said_and_a_view_can_be_skipped() {
     let judged = Judged { present: None, deviation: Some(deviation()), is_good: false };
     let mut leading = pane(led(HandWaits::View, Some(judged)));
     assert!(leading.sees("Tilt by 23°: the lower side of the board away"));
-    assert_eq!(leading.click("Skip this view"), [Command::SkipView]);
-    assert_eq!(leading.click("Stop guiding"), [Command::StopGuiding]);
+    assert_eq!(leading.click("Skip this view"), [Command::ByHand(by_hand::Command::SkipView)]);
+    assert_eq!(leading.click("Stop guiding"), [Command::ByHand(by_hand::Command::StopGuiding)]);
     assert!(leading.nothing_is_cut_off());
     assert!(pane(led(HandWaits::View, Some(Judged { is_good: true, ..judged }))).sees("Good: hold still"));
     assert!(pane(led(HandWaits::View, None)).sees("The board is not seen"));

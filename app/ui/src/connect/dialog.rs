@@ -4,15 +4,16 @@ use egui::{Align, Label, Layout, RichText, Ui};
 
 use crate::style::parts;
 use crate::style::theme::{self, Palette};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, ViewerState};
+use handeye_workbench::shell;
 use handeye_workbench::tr;
 
 /// The dialog; it goes with the viewer.
 pub fn address_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let ViewerState::Web { url } = &model.rerun.viewer else {
-        outbox.send(Command::SetDialog(None));
+        outbox.send(shell::Command::SetDialog(None));
         return;
     };
     ui.label(theme::title(tr!(language, "No browser has opened"), 17.0).color(Palette::of(ui).text));
@@ -20,7 +21,7 @@ pub fn address_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.add(Label::new(RichText::new(url).monospace()).wrap().selectable(true));
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         if ui.button(tr!(language, "Close")).clicked() {
-            outbox.send(Command::SetDialog(None));
+            outbox.send(shell::Command::SetDialog(None));
         }
         if ui.button(tr!(language, "Copy")).clicked() {
             ui.ctx().copy_text(url.clone());

@@ -6,7 +6,8 @@ use handeye_coppeliasim::cell::{BadCellPath, CellPart, CellPaths};
 use crate::style::theme::Palette;
 use crate::style::{form, parts};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::connect;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
@@ -43,7 +44,7 @@ pub(super) fn objects_ui(ui: &mut Ui, model: &Model, draft: &mut Draft, outbox: 
                 let new = read.ok().filter(|paths| *paths != model.objects);
                 let set = ui.add_enabled(new.is_some(), egui::Button::new(tr!(language, "Use these objects")));
                 if let Some(paths) = new.filter(|_| set.clicked()) {
-                    outbox.send(Command::SetObjects(paths));
+                    outbox.send(connect::Command::SetObjects(paths));
                 }
                 if ui.button(tr!(language, "As in the public UR5 scene")).clicked() {
                     typed = written(&CellPaths::default());
@@ -87,6 +88,7 @@ mod tests {
     use super::super::pane::connect_ui;
     use super::*;
     use crate::testing::driven::Driven;
+    use handeye_workbench::command::Command;
     use handeye_workbench::model::CellSource;
     use handeye_workbench::testing::sample;
 
@@ -103,7 +105,7 @@ mod tests {
         assert_eq!(pane.click("Use these objects"), [], "what is no path is not sent");
         pane.retype("Path: Tip (TCP)", "/Panda/Tip");
         let wanted = CellPaths { tip: "/Panda/Tip".to_owned(), ..CellPaths::default() };
-        assert_eq!(pane.click("Use these objects"), [Command::SetObjects(wanted)]);
+        assert_eq!(pane.click("Use these objects"), [Command::Connect(connect::Command::SetObjects(wanted))]);
         assert!(pane.nothing_is_cut_off());
     }
 

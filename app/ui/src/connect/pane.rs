@@ -9,11 +9,12 @@ use crate::status;
 use crate::style::theme::{Palette, Tone};
 use crate::style::{form, parts};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::connect::server_name;
 use handeye_workbench::model::{CellSource, Link, LinkState, Model};
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
+use handeye_workbench::{connect, session};
 
 /// What the user is about to connect to; it belongs to nothing but the window.
 #[derive(Debug, Clone, Default)]
@@ -120,7 +121,7 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let words = text!("Open {name} again, {count} {count|capture|captures}", name = name, count = last.captures);
         let button = Button::new(words.say(language)).wrap_mode(egui::TextWrapMode::Truncate);
         if ui.add(button).on_hover_text(last.folder.display().to_string()).clicked() {
-            outbox.send(Command::Open(last.folder.clone()));
+            outbox.send(session::Command::Open(last.folder.clone()));
         }
     }
     parts::hint_ui(ui, &said.say(language));
@@ -128,7 +129,7 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let words =
             if model.in_browser { tr!(language, "Download the folder") } else { tr!(language, "Open the folder") };
         if ui.button(words).clicked() {
-            outbox.send(Command::OpenFolder(folder.clone()));
+            outbox.send(session::Command::OpenFolder(folder.clone()));
         }
         parts::copy_ui(ui, language, tr!(language, "the path of the folder"), || folder.display().to_string());
     });
@@ -207,7 +208,7 @@ fn connect_button_ui(ui: &mut Ui, model: &Model, wanted: Option<&CellSource>, ou
     };
     let pressed = ui.add_enabled(wanted.is_some(), button).clicked();
     if let Some(source) = wanted.filter(|_| pressed) {
-        outbox.send(if same { Command::Reconnect } else { Command::Connect(source.clone()) });
+        outbox.send(if same { connect::Command::Reconnect } else { connect::Command::Connect(source.clone()) });
     }
     pressed
 }
@@ -245,6 +246,7 @@ mod tests {
 
     use super::*;
     use crate::testing::driven::Driven;
+    use handeye_workbench::command::Command;
     use handeye_workbench::model::RecentSession;
     use handeye_workbench::testing::sample;
 
@@ -255,12 +257,12 @@ mod tests {
         let mut pane = Driven::new(connect_ui, model);
         assert!(pane.sees("are kept in a folder of /home/me/handeye-sessions"));
         let sessions = PathBuf::from("/home/me/handeye-sessions");
-        assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(sessions.clone())]);
+        assert_eq!(pane.click("Open the folder"), [Command::Session(session::Command::OpenFolder(sessions.clone()))]);
         let session = sessions.join("2026-11-22");
         pane.model().session.folder = Some(session.clone());
         pane.steps();
         assert!(pane.sees("Captures and results are kept in /home/me/handeye-sessions/2026-11-22"));
-        assert_eq!(pane.click("Open the folder"), [Command::OpenFolder(session)]);
+        assert_eq!(pane.click("Open the folder"), [Command::Session(session::Command::OpenFolder(session))]);
         assert!(pane.nothing_is_cut_off());
     }
 
@@ -273,7 +275,10 @@ mod tests {
             RecentSession { folder: PathBuf::from("/home/me/older"), captures: 3 },
         ];
         let mut pane = Driven::new(connect_ui, model);
-        assert_eq!(pane.click("Open 2026-11-22 again, 12 captures"), [Command::Open(last.clone())]);
+        assert_eq!(
+            pane.click("Open 2026-11-22 again, 12 captures"),
+            [Command::Session(session::Command::Open(last.clone()))]
+        );
         assert!(pane.nothing_is_cut_off());
         pane.model().session.folder = Some(last);
         pane.steps();

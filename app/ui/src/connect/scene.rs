@@ -57,6 +57,7 @@ mod tests {
     use super::*;
     use crate::testing::driven::Driven;
     use handeye_workbench::command::Command;
+    use handeye_workbench::connect;
     use handeye_workbench::testing::sample;
 
     #[test]
@@ -67,7 +68,7 @@ mod tests {
         pane.click("Franka Panda, seven joints");
         pane.steps();
         let panda = CellSource::BuiltIn(SceneChoice::Shipped(ShippedScene::Panda));
-        assert_eq!(pane.click("Connect now"), [Command::Connect(panda)]);
+        assert_eq!(pane.click("Connect now"), [Command::Connect(connect::Command::Connect(panda))]);
         assert!(pane.nothing_is_cut_off());
     }
 
@@ -76,7 +77,7 @@ mod tests {
         let mut model = sample::connected();
         model.source = CellSource::BuiltIn(SceneChoice::File("cells/mine.toml".into()));
         let mut pane = Driven::new(connect_ui, model);
-        assert_eq!(pane.click("Connect again"), [Command::Reconnect]);
+        assert_eq!(pane.click("Connect again"), [Command::Connect(connect::Command::Reconnect)]);
         pane.click("Scene of the built-in cell");
         pane.steps();
         assert!(pane.sees("cells/mine.toml"));

@@ -5,8 +5,9 @@ use egui::{RichText, Ui};
 use crate::style::parts;
 use crate::style::theme::{Palette, TITLE};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::shell;
 use handeye_workbench::tr;
 
 /// The dialog.
@@ -35,7 +36,7 @@ pub fn about_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     parts::hint_ui(ui, tr!(language, "It needs no network but the connection to the cell."));
     ui.vertical_centered(|ui| {
         if ui.button(tr!(language, "Close")).clicked() {
-            outbox.send(Command::SetDialog(None));
+            outbox.send(shell::Command::SetDialog(None));
         }
     });
 }

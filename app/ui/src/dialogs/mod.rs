@@ -6,8 +6,9 @@ mod about;
 use egui::{Align, Align2, Area, Context, Frame, Id, Key, Layout, Margin, Order, Rect, Ui};
 
 use super::help;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Dialog, Model};
+use handeye_workbench::shell;
 use handeye_workbench::tr;
 
 /// Width of dialogs with forms.
@@ -24,7 +25,7 @@ pub fn dialogs_ui(ctx: &Context, model: &Model, outbox: &mut Outbox) {
                 help::keys_ui(ui, model);
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     if ui.button(tr!(model.view.language, "Close")).clicked() {
-                        outbox.send(Command::SetDialog(None));
+                        outbox.send(shell::Command::SetDialog(None));
                     }
                 });
             });
@@ -55,7 +56,7 @@ fn over_ui(ctx: &Context, width: f32, outbox: &mut Outbox, content_ui: impl FnOn
     });
     let escaped = ctx.input(|input| input.key_pressed(Key::Escape));
     if escaped || pressed_outside(ctx, shown.response.rect) {
-        outbox.send(Command::SetDialog(None));
+        outbox.send(shell::Command::SetDialog(None));
     }
 }
 

@@ -5,11 +5,13 @@ use egui_kittest::kittest::Queryable as _;
 
 use super::*;
 use crate::testing::driven::Driven;
+use handeye_workbench::command::Command;
 use handeye_workbench::model::{
     FolderEntry, FolderKind, FolderListing, Messages, RecentSession, Severity, ViewerState,
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
+use handeye_workbench::{export, session, shell, taught};
 
 fn shown_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     dialogs_ui(ui.ctx(), model, outbox);
@@ -42,7 +44,7 @@ fn first(commands: Vec<Command>) -> Command {
 #[test]
 fn the_folder_is_asked_for_when_the_dialog_opens_and_not_again() {
     let mut pane = driven(Dialog::Open);
-    assert_eq!(pane.commands(), [Command::ListFolder(PathBuf::from("/data"))]);
+    assert_eq!(pane.commands(), [Command::Session(session::Command::ListFolder(PathBuf::from("/data")))]);
     pane.steps();
     assert!(pane.commands().is_empty());
 }
@@ -53,7 +55,7 @@ fn sessions_and_data_sets_are_marked_and_opened() {
     assert!(pane.sees("recorded, data set"));
     assert!(!pane.sees("poses.toml"), "a file is nothing to open");
     pane.click("monday, session");
-    assert_eq!(first(pane.click("Open")), Command::Open(PathBuf::from("/data/monday")));
+    assert_eq!(first(pane.click("Open")), Command::Session(session::Command::Open(PathBuf::from("/data/monday"))));
 }
 
 #[test]
@@ -61,17 +63,20 @@ fn a_session_of_before_is_opened() {
     let mut pane = driven(Dialog::Open);
     assert!(pane.sees("12 captures"));
     pane.click("tuesday");
-    assert_eq!(first(pane.click("Open")), Command::Open(PathBuf::from("/data/tuesday")));
+    assert_eq!(first(pane.click("Open")), Command::Session(session::Command::Open(PathBuf::from("/data/tuesday"))));
 }
 
 #[test]
 fn return_opens_what_was_clicked() {
     let mut pane = driven(Dialog::Open);
     pane.click("tuesday");
-    assert_eq!(first(pane.press(Key::Enter)), Command::Open(PathBuf::from("/data/tuesday")));
+    assert_eq!(first(pane.press(Key::Enter)), Command::Session(session::Command::Open(PathBuf::from("/data/tuesday"))));
     let mut pane = driven(Dialog::Open);
     pane.click("flash drive, images");
-    assert_eq!(first(pane.press(Key::Enter)), Command::Open(PathBuf::from("/data/flash drive")));
+    assert_eq!(
+        first(pane.press(Key::Enter)),
+        Command::Session(session::Command::Open(PathBuf::from("/data/flash drive")))
+    );
 }
 
 #[test]
@@ -80,7 +85,7 @@ fn what_is_typed_goes_on_behind_the_path() {
     pane.steps();
     pane.harness.input_mut().events.push(egui::Event::Text("/x".to_owned()));
     pane.steps();
-    assert_eq!(first(pane.click("Open")), Command::Open(PathBuf::from("/data/x")));
+    assert_eq!(first(pane.click("Open")), Command::Session(session::Command::Open(PathBuf::from("/data/x"))));
 }
 
 #[test]
@@ -88,11 +93,18 @@ fn the_keyboard_is_enough() {
     let mut pane = driven(Dialog::Open);
     pane.press(Key::ArrowDown);
     pane.press(Key::ArrowDown);
-    assert_eq!(first(pane.press(Key::Enter)), Command::Open(PathBuf::from("/data/recorded")));
+    assert_eq!(
+        first(pane.press(Key::Enter)),
+        Command::Session(session::Command::Open(PathBuf::from("/data/recorded")))
+    );
     let mut pane = driven(Dialog::Open);
     pane.press(Key::ArrowUp);
-    assert_eq!(pane.press(Key::Enter), [Command::ListFolder(PathBuf::from("/data/more"))], "a folder is gone into");
-    assert_eq!(pane.press(Key::Escape), [Command::SetDialog(None)]);
+    assert_eq!(
+        pane.press(Key::Enter),
+        [Command::Session(session::Command::ListFolder(PathBuf::from("/data/more")))],
+        "a folder is gone into"
+    );
+    assert_eq!(pane.press(Key::Escape), [Command::Shell(shell::Command::SetDialog(None))]);
 }
 
 #[test]
@@ -104,7 +116,7 @@ fn the_dialog_closes_when_the_session_is_there_and_says_why_when_it_is_not() {
     pane.harness.step();
     pane.model().opening = true;
     pane.steps();
-    assert!(!pane.commands().contains(&Command::SetDialog(None)), "it is still being opened");
+    assert!(!pane.commands().contains(&Command::Shell(shell::Command::SetDialog(None))), "it is still being opened");
     pane.model().opening = false;
     let text = Text::verbatim("The session is of a later version.");
     pane.model().messages.say(Severity::Error, text, 100.0);
@@ -113,7 +125,7 @@ fn the_dialog_closes_when_the_session_is_there_and_says_why_when_it_is_not() {
     assert!(pane.commands().is_empty());
     pane.model().messages = Messages::default();
     pane.steps();
-    assert_eq!(pane.commands(), [Command::SetDialog(None)]);
+    assert_eq!(pane.commands(), [Command::Shell(shell::Command::SetDialog(None))]);
 }
 
 #[test]
@@ -123,20 +135,23 @@ fn a_folder_that_cannot_be_read_is_said() {
         Some(FolderListing { folder: PathBuf::from("/root"), entries: Err("permission denied".to_owned()) });
     pane.steps();
     assert!(pane.sees("The folder cannot be read: permission denied"));
-    assert_eq!(pane.click("Folder above"), [Command::ListFolder(PathBuf::from("/"))]);
+    assert_eq!(pane.click("Folder above"), [Command::Session(session::Command::ListFolder(PathBuf::from("/")))]);
 }
 
 #[test]
 fn a_new_session_needs_no_path() {
     let mut pane = driven(Dialog::New);
-    assert_eq!(first(pane.click("Begin")), Command::NewSession(None));
+    assert_eq!(first(pane.click("Begin")), Command::Session(session::Command::New(None)));
 }
 
 #[test]
 fn a_copy_gets_a_name_that_stays_from_folder_to_folder() {
     let mut pane = driven(Dialog::SaveAs);
-    assert_eq!(pane.click("more"), [Command::ListFolder(PathBuf::from("/data/more"))]);
-    assert_eq!(first(pane.click("Save the copy")), Command::SaveAs(PathBuf::from("/data/more/sample-copy")));
+    assert_eq!(pane.click("more"), [Command::Session(session::Command::ListFolder(PathBuf::from("/data/more")))]);
+    assert_eq!(
+        first(pane.click("Save the copy")),
+        Command::Session(session::Command::SaveAs(PathBuf::from("/data/more/sample-copy")))
+    );
 }
 
 #[test]
@@ -144,19 +159,19 @@ fn files_of_poses_are_read_and_written() {
     let mut pane = driven(Dialog::ImportPoses);
     assert!(!pane.is_enabled("Import"), "a folder is no file of poses");
     pane.click("poses.toml, poses");
-    let import = Command::ImportTaught(PathBuf::from("/data/poses.toml"));
-    assert_eq!(pane.click("Import"), [import, Command::SetDialog(None)]);
+    let import = Command::Taught(taught::Command::Import(PathBuf::from("/data/poses.toml")));
+    assert_eq!(pane.click("Import"), [import, Command::Shell(shell::Command::SetDialog(None))]);
     let mut pane = driven(Dialog::ExportPoses);
-    let export = Command::ExportTaught(PathBuf::from("/data/poses.toml"));
-    assert_eq!(pane.click("Write"), [export, Command::SetDialog(None)]);
+    let export = Command::Taught(taught::Command::Export(PathBuf::from("/data/poses.toml")));
+    assert_eq!(pane.click("Write"), [export, Command::Shell(shell::Command::SetDialog(None))]);
 }
 
 #[test]
 fn a_folder_for_exports_is_chosen() {
     let mut pane = driven(Dialog::ExportFolder);
     pane.click("more");
-    let chosen = Command::SetExportFolder(Some(PathBuf::from("/data/more")));
-    assert_eq!(pane.click("Choose"), [chosen, Command::SetDialog(None)]);
+    let chosen = Command::Export(export::Command::SetFolder(Some(PathBuf::from("/data/more"))));
+    assert_eq!(pane.click("Choose"), [chosen, Command::Shell(shell::Command::SetDialog(None))]);
 }
 
 #[test]
@@ -165,7 +180,7 @@ fn what_this_is_and_its_licences_can_be_read() {
     assert!(pane.sees(env!("CARGO_PKG_VERSION")));
     assert!(pane.sees("This program: MIT OR Apache-2.0"));
     assert!(pane.sees("Noto Sans SC: SIL Open Font License 1.1"));
-    assert_eq!(pane.click("Close"), [Command::SetDialog(None)]);
+    assert_eq!(pane.click("Close"), [Command::Shell(shell::Command::SetDialog(None))]);
 }
 
 #[test]
@@ -192,5 +207,5 @@ fn the_address_of_the_web_viewer_can_be_read_and_copied_where_no_browser_opens()
 fn the_address_of_a_viewer_that_is_gone_is_not_shown() {
     let mut pane = driven(Dialog::RerunAddress);
     pane.steps();
-    assert!(pane.commands().contains(&Command::SetDialog(None)));
+    assert!(pane.commands().contains(&Command::Shell(shell::Command::SetDialog(None))));
 }

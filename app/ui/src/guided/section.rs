@@ -9,11 +9,12 @@ use crate::style::marks::Marks;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::guided::state::{GuidedProgress, Waits};
 use handeye_workbench::model::{Model, Motion, Pane, PoseSequence};
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
+use handeye_workbench::{guided, motion, taught};
 
 /// The button, where nothing is under way.
 pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, height: f32, outbox: &mut Outbox) {
@@ -30,7 +31,7 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
          it; what was captured is kept"
     );
     if parts::gated_ui(ui, blocked(model, hindrance), button).on_hover_text(what).clicked() {
-        outbox.send(Command::CalibrateForMe);
+        outbox.send(guided::Command::CalibrateForMe);
     }
     if let Some(pose) = way_to_board(model, hindrance) {
         let words = text!("Go to {name}", name = pose).say(language);
@@ -40,7 +41,7 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
              be calibrated"
         );
         if ui.add(Button::new(words).min_size(Vec2::new(0.0, height))).on_hover_text(what).clicked() {
-            outbox.send(Command::GoToTaught(pose.to_owned()));
+            outbox.send(taught::Command::GoTo(pose.to_owned()));
         }
     }
 }
@@ -120,7 +121,7 @@ pub fn confirm_moves_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
          switched at any time"
     );
     if ui.checkbox(&mut confirm, tr!(language, "Confirm each move")).on_hover_text(what).changed() {
-        outbox.send(Command::SetConfirmMoves(confirm));
+        outbox.send(motion::Command::SetConfirmMoves(confirm));
     }
 }
 

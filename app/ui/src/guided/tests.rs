@@ -14,6 +14,7 @@ use handeye_workbench::model::{
 use handeye_workbench::taught::update::reference_poses;
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
+use handeye_workbench::{guided, motion, taught};
 
 const BUTTON: &str = "Calibrate for me";
 const FOREIGN: ArmDoubt = ArmDoubt::Foreign { distance_m: 0.074, angle_rad: 0.1 };
@@ -60,7 +61,7 @@ fn under_way(waits: Waits, ending: Option<Ending>) -> Model {
 #[test]
 fn it_is_offered_where_it_can_begin() {
     let mut pane = pane(ready());
-    assert_eq!(pane.click(BUTTON), [Command::CalibrateForMe]);
+    assert_eq!(pane.click(BUTTON), [Command::Guided(guided::Command::CalibrateForMe)]);
     let is_blocked = |change: fn(&mut Model)| {
         let mut model = ready();
         change(&mut model);
@@ -84,7 +85,7 @@ fn where_the_board_is_not_in_view_the_way_there_is_offered() {
         model.board_seen_s = None;
         model
     };
-    assert_eq!(pane(unseen()).click("Go to P1"), [Command::GoToTaught("P1".to_owned())]);
+    assert_eq!(pane(unseen()).click("Go to P1"), [Command::Taught(taught::Command::GoTo("P1".to_owned()))]);
     let is_offered = |change: fn(&mut Model)| {
         let mut model = unseen();
         change(&mut model);
@@ -105,7 +106,7 @@ fn behind_a_driver_it_is_offered_where_the_chain_of_joints_is_named_and_can_begi
         change(cell);
         self::pane(model)
     };
-    assert_eq!(behind(|_| ()).click(BUTTON), [Command::CalibrateForMe]);
+    assert_eq!(behind(|_| ()).click(BUTTON), [Command::Guided(guided::Command::CalibrateForMe)]);
     let mut read_only = ready();
     read_only.cell.iter_mut().for_each(|cell| cell.moves = Moves::OnceArmed { joints: true, tip: true });
     read_only.robot.iter_mut().for_each(|robot| robot.is_armed = false);
@@ -171,9 +172,13 @@ fn a_person_lets_the_arm_move_or_has_another_pose_chosen() {
     model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
     let mut waiting = pane(model.clone());
     assert!(waiting.sees("Pose 2 waits for you"));
-    assert_eq!(waiting.click("Move there"), [Command::ConfirmMove]);
-    assert_eq!(waiting.click("Skip this pose"), [Command::SkipMove]);
-    assert_eq!(waiting.click("Confirm each move"), [Command::SetConfirmMoves(false)], "on behind an address");
+    assert_eq!(waiting.click("Move there"), [Command::Motion(motion::Command::ConfirmMove)]);
+    assert_eq!(waiting.click("Skip this pose"), [Command::Motion(motion::Command::SkipMove)]);
+    assert_eq!(
+        waiting.click("Confirm each move"),
+        [Command::Motion(motion::Command::SetConfirmMoves(false))],
+        "on behind an address"
+    );
     assert!(waiting.nothing_is_cut_off());
     let mut read_only = model.clone();
     read_only.cell.iter_mut().for_each(|cell| cell.moves = Moves::OnceArmed { joints: true, tip: true });

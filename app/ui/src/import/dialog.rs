@@ -15,11 +15,12 @@ use image::RgbImage;
 use crate::style::parts;
 use crate::style::theme::{Palette, TITLE, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::import::understand;
 use handeye_workbench::model::{Found, ImportState, ImportWork, Model};
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
+use handeye_workbench::{import, shell};
 
 /// Hypotheses that are listed.
 const LISTED: usize = 12;
@@ -139,7 +140,7 @@ fn target_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, tr!(language, "Target")));
         let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if ui.button(tr!(language, "Look again")).clicked() || entered {
-            outbox.send(Command::SetImportTarget(typed.clone()));
+            outbox.send(import::Command::SetTarget(typed.clone()));
         }
     });
     ui.data_mut(|data| data.insert_temp(id, typed));
@@ -205,7 +206,7 @@ fn typed_ui(ui: &mut Ui, of: &Typed, import: &ImportState, language: Language, o
         let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if ui.button(of.button.say(language)).clicked() || entered {
             let value = (!typed.trim().is_empty()).then(|| typed.trim().to_owned());
-            outbox.send(Command::FixConvention { key: of.key.to_owned(), value });
+            outbox.send(import::Command::FixConvention { key: of.key.to_owned(), value });
         }
     });
     ui.data_mut(|data| data.insert_temp(id, typed));
@@ -218,7 +219,7 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
     if let Some(work) = import.work {
         let (said, part) = said_of(work);
         if parts::progress_ui(ui, part, &said.say(language), tr!(language, "Cancel")) {
-            outbox.send(Command::SetDialog(None));
+            outbox.send(shell::Command::SetDialog(None));
         }
         return;
     }
@@ -288,7 +289,7 @@ fn time_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut O
         for seconds in READING_S {
             let said = text!("{seconds} s", seconds = seconds).say(language);
             if ui.radio(now == u64::from(seconds), said).clicked() {
-                outbox.send(Command::SetImportTime(seconds));
+                outbox.send(import::Command::SetTime(seconds));
             }
         }
     });
@@ -322,7 +323,7 @@ fn list_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language,
         let colour = if h.explains() { Palette::of(ui).text } else { Palette::of(ui).weak };
         let chosen = import.chosen == Some(place);
         if ui.radio(chosen, RichText::new(line).color(colour)).clicked() {
-            outbox.send(Command::ChooseHypothesis(place));
+            outbox.send(import::Command::ChooseHypothesis(place));
         }
         if chosen && let Some(fit) = &h.fit {
             let (camera, target) = (fit.camera_at_m * 1e3, fit.target_at_m * 1e3);
@@ -355,7 +356,7 @@ fn buttons_ui(ui: &mut Ui, model: &Model, import: &ImportState, language: Langua
         let reason = if can { None } else { Some(tr!(language, "Choose an interpretation first")) };
         let button = Button::new(RichText::new(tr!(language, "Import")).strong());
         if parts::gated_ui(ui, reason, button).clicked() {
-            outbox.send(Command::ConvertRecording);
+            outbox.send(import::Command::ConvertRecording);
         }
         if let Some(found) = import.found.as_deref().filter(|found| found.has_images()) {
             let is_busy = import.work.is_some() || model.opening;
@@ -365,11 +366,11 @@ fn buttons_ui(ui: &mut Ui, model: &Model, import: &ImportState, language: Langua
             let button = Button::new(tr!(language, "Calibrate the camera alone"));
             let what = tr!(language, "The intrinsics from the images, without the poses of a robot");
             if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
-                outbox.send(Command::ConvertImages);
+                outbox.send(import::Command::ConvertImages);
             }
         }
         if ui.button(tr!(language, "Close")).clicked() {
-            outbox.send(Command::SetDialog(None));
+            outbox.send(shell::Command::SetDialog(None));
         }
         if model.opening {
             parts::hint_ui(ui, tr!(language, "Just a moment…"));

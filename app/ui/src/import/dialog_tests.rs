@@ -13,7 +13,9 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::*;
 use crate::testing::driven::Driven;
+use handeye_workbench::command::Command;
 use handeye_workbench::model::Dialog;
+use handeye_workbench::shell;
 use handeye_workbench::testing::sample;
 
 fn shown_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -134,11 +136,11 @@ fn what_the_data_do_not_tell_waits_for_a_person() {
     assert!(pane.sees("image7.png is a copy of image3.png, byte by byte"));
     assert!(!pane.is_enabled("Import"), "nothing is taken in silence");
     let second = "2.  0.35 mm  0.057°  eye_to_hand  tip_from_base";
-    assert_eq!(pane.click(second), [Command::ChooseHypothesis(1)]);
+    assert_eq!(pane.click(second), [Command::Import(handeye_workbench::import::Command::ChooseHypothesis(1))]);
     pane.model().import.as_deref_mut().expect("open").chosen = Some(1);
     pane.steps();
     assert!(pane.sees("0 views disagree"));
-    assert_eq!(pane.click("Import"), [Command::ConvertRecording]);
+    assert_eq!(pane.click("Import"), [Command::Import(handeye_workbench::import::Command::ConvertRecording)]);
 }
 
 #[test]
@@ -148,7 +150,10 @@ fn the_camera_alone_is_calibrated_once_the_target_is_named() {
     assert!(!pane.is_enabled("Calibrate the camera alone"));
     let given = handeye_workbench::arguments::of_text("10x7x15").expect("a target");
     let mut pane = driven(Some(without_meaning(Some(given))), None);
-    assert_eq!(pane.click("Calibrate the camera alone"), [Command::ConvertImages]);
+    assert_eq!(
+        pane.click("Calibrate the camera alone"),
+        [Command::Import(handeye_workbench::import::Command::ConvertImages)]
+    );
 }
 
 fn without_meaning(given: Option<handeye_geometry::targets::TargetSpec>) -> Found {
@@ -161,7 +166,10 @@ fn what_is_known_is_fixed_and_given_back_to_the_data() {
     pane.harness.get_by_role_and_label(Role::ComboBox, "Where the camera sits").click();
     pane.steps();
     let value = Some("eye_to_hand".to_owned());
-    assert_eq!(pane.click("eye_to_hand"), [Command::FixConvention { key: "mode".to_owned(), value }]);
+    assert_eq!(
+        pane.click("eye_to_hand"),
+        [Command::Import(handeye_workbench::import::Command::FixConvention { key: "mode".to_owned(), value })]
+    );
 }
 
 /// The command line names the option; whoever is at the window needs a field.
@@ -190,7 +198,10 @@ fn the_size_of_images_that_no_file_tells_is_typed() {
     pane.harness.get_by_role_and_label(Role::TextInput, "Image size").type_text("1280x720");
     pane.steps();
     let value = Some("1280x720".to_owned());
-    assert_eq!(pane.press(egui::Key::Enter), [Command::FixConvention { key: "image_size".to_owned(), value }]);
+    assert_eq!(
+        pane.press(egui::Key::Enter),
+        [Command::Import(handeye_workbench::import::Command::FixConvention { key: "image_size".to_owned(), value })]
+    );
     pane.model().view.language = Language::Chinese;
     pane.steps();
     assert!(pane.sees("没有文件说明图像的大小"));
@@ -278,7 +289,7 @@ fn progress_is_shown_and_can_be_ended() {
     pane.steps();
     assert!(pane.sees("3 of 20 images looked at"));
     assert!(!pane.is_enabled("Import"));
-    assert_eq!(pane.click("Cancel"), [Command::SetDialog(None)]);
+    assert_eq!(pane.click("Cancel"), [Command::Shell(shell::Command::SetDialog(None))]);
 }
 
 #[test]

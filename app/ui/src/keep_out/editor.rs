@@ -9,11 +9,12 @@ use handeye_plan::surroundings::{KeepOutBox, KeepOutFile};
 use crate::style::parts;
 use crate::style::theme::Palette;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::keep_out::state::with_drawn;
 use handeye_workbench::model::{Dialog, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{keep_out, shell};
 
 /// Width of the editor.
 const WIDTH: f32 = 268.0;
@@ -98,14 +99,14 @@ fn buttons_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         if ui.button(tr!(language, "Add a box")).clicked() {
             let in_front = with_drawn(&model.keep_out.content, [0.4, -0.1], [0.6, 0.1]);
-            outbox.send(Command::SetKeepOut(Box::new(in_front.expect("a rectangle"))));
+            outbox.send(keep_out::Command::Set(Box::new(in_front.expect("a rectangle"))));
         }
         if ui.button(tr!(language, "Read…")).clicked() {
-            outbox.send(Command::SetDialog(Some(Dialog::ImportKeepOut)));
+            outbox.send(shell::Command::SetDialog(Some(Dialog::ImportKeepOut)));
         }
         let is_whole = model.keep_out.fault.is_none() && model.keep_out.content != KeepOutFile::default();
         if ui.add_enabled(is_whole, Button::new(tr!(language, "Write…"))).clicked() {
-            outbox.send(Command::SetDialog(Some(Dialog::ExportKeepOut)));
+            outbox.send(shell::Command::SetDialog(Some(Dialog::ExportKeepOut)));
         }
     });
     let hint = if is_on {
@@ -141,7 +142,7 @@ fn boxes_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         parts::hint_ui(ui, tr!(language, "The file has a work volume or limits of speed, too; they are kept to."));
     }
     if content != model.keep_out.content {
-        outbox.send(Command::SetKeepOut(Box::new(content)));
+        outbox.send(keep_out::Command::Set(Box::new(content)));
     }
 }
 

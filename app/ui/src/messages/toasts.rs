@@ -8,7 +8,8 @@ use egui::{CornerRadius, FontId, Galley, Rect, Sense, Stroke, StrokeKind, Ui, Ve
 use crate::shell::layout::Layout;
 use crate::style::icons::{self, Icon};
 use crate::style::theme::{CARD_RADIUS, Palette};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::messages;
 use handeye_workbench::model::{Home, Message, Model, Severity};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
@@ -65,7 +66,7 @@ pub fn toasts_ui(ui: &mut Ui, model: &Model, layout: &Layout, outbox: &mut Outbo
         let rect = Rect::from_min_max(egui::pos2(room.left(), bottom - height), egui::pos2(room.right(), bottom));
         bottom -= height + BETWEEN;
         if toast_ui(ui, rect, message, &said, galley, language) {
-            outbox.send(Command::DismissMessage(message.number));
+            outbox.send(messages::Command::Dismiss(message.number));
         }
     }
 }

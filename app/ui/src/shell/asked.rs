@@ -7,8 +7,9 @@ use crate::style::marks::Marks;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Motion};
+use handeye_workbench::motion;
 use handeye_workbench::motion::way::Way;
 use handeye_workbench::tr;
 
@@ -30,7 +31,7 @@ pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let button = Button::new(words).fill(Palette::of(ui).accent);
         let what = tr!(language, "The path is clear of all known obstacles. STOP ends the move");
         if parts::gated_ui(ui, hindrance, button).on_hover_text(what).clicked() {
-            outbox.send(Command::ConfirmMove);
+            outbox.send(motion::Command::ConfirmMove);
         }
         let (name, what) = if model.sequence_runs {
             (
@@ -41,7 +42,7 @@ pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             (tr!(language, "Do not move"), tr!(language, "The arm stays where it is"))
         };
         if ui.button(name).on_hover_text(what).clicked() {
-            outbox.send(Command::SkipMove);
+            outbox.send(motion::Command::SkipMove);
         }
     });
 }

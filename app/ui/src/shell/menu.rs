@@ -10,6 +10,7 @@ use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{Dialog, Model, Pane, ThemeChoice};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{session, shell};
 
 /// The button that opens the menu.
 pub fn menu_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -26,7 +27,7 @@ pub fn menu_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, name));
 }
 
-fn item_ui(ui: &mut Ui, outbox: &mut Outbox, name: &str, keys: &str, command: Command) {
+fn item_ui(ui: &mut Ui, outbox: &mut Outbox, name: &str, keys: &str, command: impl Into<Command>) {
     let button = Button::new(name).shortcut_text(keys).min_size(Vec2::new(ui.available_width(), 0.0));
     if ui.add(button).clicked() {
         outbox.send(command);
@@ -37,19 +38,19 @@ fn item_ui(ui: &mut Ui, outbox: &mut Outbox, name: &str, keys: &str, command: Co
 fn content_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     ui.set_min_width(220.0);
-    item_ui(ui, outbox, tr!(language, "New session…"), "Ctrl+N", Command::SetDialog(Some(Dialog::New)));
-    item_ui(ui, outbox, tr!(language, "Open session…"), "Ctrl+O", Command::SetDialog(Some(Dialog::Open)));
+    item_ui(ui, outbox, tr!(language, "New session…"), "Ctrl+N", shell::Command::SetDialog(Some(Dialog::New)));
+    item_ui(ui, outbox, tr!(language, "Open session…"), "Ctrl+O", shell::Command::SetDialog(Some(Dialog::Open)));
     if !model.opening && !model.sequence_runs {
-        item_ui(ui, outbox, tr!(language, "Open a sample"), "", Command::OpenSample);
+        item_ui(ui, outbox, tr!(language, "Open a sample"), "", session::Command::OpenSample);
     }
-    item_ui(ui, outbox, tr!(language, "Save session…"), "Ctrl+S", Command::SetDialog(Some(Dialog::SaveAs)));
+    item_ui(ui, outbox, tr!(language, "Save session…"), "Ctrl+S", shell::Command::SetDialog(Some(Dialog::SaveAs)));
     ui.separator();
     ui.menu_button(tr!(language, "Theme"), |ui| {
         for (theme, name) in
             [(ThemeChoice::Dark, tr!(language, "Dark theme")), (ThemeChoice::Light, tr!(language, "Light theme"))]
         {
             if ui.radio(model.view.theme == theme, name).clicked() {
-                outbox.send(Command::SetTheme(theme));
+                outbox.send(shell::Command::SetTheme(theme));
                 ui.close();
             }
         }
@@ -57,7 +58,7 @@ fn content_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.menu_button(tr!(language, "Language"), |ui| {
         for other in Language::ALL {
             if ui.radio(language == other, other.own_name()).clicked() {
-                outbox.send(Command::SetLanguage(other));
+                outbox.send(shell::Command::SetLanguage(other));
                 ui.close();
             }
         }
@@ -65,18 +66,18 @@ fn content_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.menu_button(tr!(language, "Layout"), |ui| {
         for pane in Pane::ALL {
             if ui.button(title(pane, language)).clicked() {
-                outbox.send(Command::ShowPane(pane));
+                outbox.send(shell::Command::ShowPane(pane));
                 ui.close();
             }
         }
         ui.separator();
         if ui.button(tr!(language, "Reset layout")).clicked() {
-            outbox.send(Command::ResetLayout);
+            outbox.send(shell::Command::ResetLayout);
             ui.close();
         }
     });
     ui.separator();
-    item_ui(ui, outbox, tr!(language, "All commands"), "Ctrl+K", Command::SetDialog(Some(Dialog::Palette)));
-    item_ui(ui, outbox, tr!(language, "Keyboard"), "F1", Command::SetDialog(Some(Dialog::Help)));
-    item_ui(ui, outbox, tr!(language, "About"), "", Command::SetDialog(Some(Dialog::About)));
+    item_ui(ui, outbox, tr!(language, "All commands"), "Ctrl+K", shell::Command::SetDialog(Some(Dialog::Palette)));
+    item_ui(ui, outbox, tr!(language, "Keyboard"), "F1", shell::Command::SetDialog(Some(Dialog::Help)));
+    item_ui(ui, outbox, tr!(language, "About"), "", shell::Command::SetDialog(Some(Dialog::About)));
 }

@@ -2,13 +2,13 @@
 
 use egui::{Align2, Color32, CornerRadius, FontId, Rect, Sense, Stroke, Ui, Vec2, WidgetInfo, WidgetType};
 
-use crate::shell;
 use crate::steps::{self, StepState, StepStatus};
 use crate::style::fonts;
 use crate::style::icons::{self, Icon};
 use crate::style::theme::{CAPTION, CARD_RADIUS, Palette};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::shell;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -30,7 +30,7 @@ pub fn rail_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     for (index, status) in steps.iter().enumerate() {
         let is_next = next == Some(status.step);
         if step_ui(ui, index, status, is_next, language) {
-            outbox.send(Command::GoToStep(status.step));
+            outbox.send(shell::Command::GoToStep(status.step));
         }
     }
 }
@@ -39,7 +39,7 @@ pub fn rail_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 fn step_ui(ui: &mut Ui, index: usize, status: &StepStatus, is_next: bool, language: Language) -> bool {
     let palette = Palette::of(ui);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::click());
-    let name = shell::step_name(status.step, language);
+    let name = crate::shell::step_name(status.step, language);
     let line = status.line.say(language);
     response.widget_info(|| {
         let label = format!("{} {name}: {} ({line})", index + 1, state_name(status.state, language));

@@ -7,10 +7,11 @@ use crate::shell::reasons::immovable;
 use crate::shell::reasons::needs_robot;
 use crate::style::parts;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{CapturePurpose, Model, PoseSequence, StopOutcome};
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
+use handeye_workbench::{connect, motion, taught};
 
 /// Buttons that begin a sequence, or its progress.
 pub fn sequence_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -48,7 +49,7 @@ fn begin_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         ] {
             let reason = reason.or_else(|| purpose.and_then(|_| needs_robot(model)));
             if parts::gated_ui(ui, reason, Button::new(name)).on_hover_text(what).clicked() {
-                outbox.send(Command::RunSequence { purpose });
+                outbox.send(taught::Command::RunSequence { purpose });
             }
         }
         home_ui(ui, model, outbox);
@@ -63,7 +64,7 @@ pub fn home_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let what =
             tr!(language, "Moves the arm to where it stood when the cell was connected, around what is in the way");
         if parts::gated_ui(ui, immovable(model), button).on_hover_text(what).clicked() {
-            outbox.send(Command::GoHome);
+            outbox.send(motion::Command::GoHome);
         }
     }
     if model.source.is_built_in() {
@@ -74,7 +75,7 @@ pub fn home_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         );
         let reason = model.sequence_runs.then(|| tr!(language, "A sequence is under way"));
         if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
-            outbox.send(Command::ResetCell);
+            outbox.send(connect::Command::ResetCell);
         }
     }
 }
@@ -118,7 +119,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     }
     .say(language);
     if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop the sequence")) {
-        outbox.send(Command::StopSequence);
+        outbox.send(taught::Command::StopSequence);
     }
     asked_ui(ui, model, outbox);
 }
@@ -151,6 +152,6 @@ pub fn continue_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     let button = Button::new(tr!(language, "Continue the sequence"));
     let what = tr!(language, "Goes on at the pose at which it was broken off, with those that are left");
     if parts::gated_ui(ui, immovable(model), button).on_hover_text(what).clicked() {
-        outbox.send(Command::ContinueSequence);
+        outbox.send(taught::Command::ContinueSequence);
     }
 }

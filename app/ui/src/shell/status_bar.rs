@@ -9,8 +9,9 @@ use crate::status::{STALE_AFTER_S, robot_age};
 use crate::style::numbers;
 use crate::style::theme::{self, CAPTION, Palette};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{CellSource, FollowStatus, Model, Motion, RobotState, RotationFormat, Severity};
+use handeye_workbench::shell;
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
 
@@ -131,7 +132,7 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
                 RotationFormat::RollPitchYaw => tr!(language, "Write the rotation as roll, pitch and yaw"),
             });
         if button.clicked() {
-            outbox.send(Command::SetRotationFormat(next));
+            outbox.send(shell::Command::SetRotationFormat(next));
         }
     });
 }

@@ -12,7 +12,8 @@ use crate::live::textures::Textures;
 use crate::shell::layout::{Layout, Slot};
 use crate::style::fonts;
 use crate::style::theme::{self, CARD_RADIUS, GAP, Palette};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::live;
 use handeye_workbench::model::{Model, Moves, Pane};
 use handeye_workbench::tr;
 
@@ -33,7 +34,7 @@ pub fn tiles_ui(ui: &mut Ui, model: &Model, textures: &mut Textures, layout: &mu
     layout.tree.ui(&mut panes, ui);
     let pointed = panes.pointed;
     if pointed != model.cursor {
-        outbox.send(Command::PointAt(pointed));
+        outbox.send(live::Command::PointAt(pointed));
     }
     let bar = tabs_height(ui.spacing());
     let cards = layout.cards().filter_map(|id| layout.tree.tiles.rect(id)).flat_map(|rect| {

@@ -15,6 +15,7 @@ use handeye_workbench::session::facts::SessionFacts;
 use handeye_workbench::session::facts::of;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
+use handeye_workbench::{motion, session};
 
 /// Height of the buttons.
 const HEIGHT: f32 = 30.0;
@@ -34,9 +35,9 @@ pub fn top_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             ui.add_space(4.0);
             menu::menu_ui(ui, model, outbox);
             ui.spacing_mut().item_spacing.x = 4.0;
-            let redo = (tr!(language, "Redo"), session.redo.as_ref(), Command::Redo);
+            let redo = (tr!(language, "Redo"), session.redo.as_ref(), Command::Session(session::Command::Redo));
             history_ui(ui, Icon::Redo, redo, language, outbox);
-            let undo = (tr!(language, "Undo"), session.undo.as_ref(), Command::Undo);
+            let undo = (tr!(language, "Undo"), session.undo.as_ref(), Command::Session(session::Command::Undo));
             history_ui(ui, Icon::Undo, undo, language, outbox);
             rerun_button_ui(ui, &model.rerun, language, outbox);
             ui.spacing_mut().item_spacing.x = 8.0;
@@ -146,6 +147,6 @@ fn stop_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         .stroke(Stroke::NONE)
         .min_size(Vec2::new(104.0, HEIGHT));
     if stop_button_ui(ui, button).on_hover_text(face.hint).clicked() {
-        outbox.send(Command::Stop);
+        outbox.send(motion::Command::Stop);
     }
 }

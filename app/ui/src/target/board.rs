@@ -8,8 +8,9 @@ use super::drawing::drawing_ui;
 use crate::style::theme::Tone;
 use crate::style::{form, parts};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::target;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -190,7 +191,7 @@ fn numbers_ui(ui: &mut Ui, target: &TargetSpec, language: Language, outbox: &mut
         // A board that cannot be is not looked for; the one before stays, with what was wrong.
         let refused = wanted.check().err().map(|why| why.to_string());
         if refused.is_none() {
-            outbox.send(Command::SetTarget(wanted));
+            outbox.send(target::Command::Set(wanted));
         }
         parts::remember(ui, key, refused);
     }
@@ -315,7 +316,7 @@ fn print_ui(ui: &mut Ui, language: Language, outbox: &mut Outbox) {
     }
     let what = tr!(language, "Writes a PDF of the board at its true size, with rulers to check the print");
     if ui.add(Button::new(tr!(language, "Print the board"))).on_hover_text(what).clicked() {
-        outbox.send(Command::PrintTarget(page));
+        outbox.send(target::Command::Print(page));
     }
 }
 
@@ -330,6 +331,7 @@ mod tests {
     use super::super::pane::target_ui;
     use super::*;
     use crate::testing::driven::Driven;
+    use handeye_workbench::command::Command;
     use handeye_workbench::testing::sample;
 
     /// Chooses from a list; gives the board that is asked for.
@@ -338,7 +340,7 @@ mod tests {
         pane.steps();
         let commands = pane.click(entry);
         let target = commands.iter().find_map(|command| match command {
-            Command::SetTarget(target) => Some(*target),
+            Command::Target(target::Command::Set(target)) => Some(*target),
             _ => None,
         })?;
         put(pane, target);
@@ -369,7 +371,7 @@ mod tests {
             assert!(pane.sees(field), "{name}");
             assert!(pane.nothing_is_cut_off(), "{name}");
             target_pdf(&target, Page::A4).expect("it can be printed");
-            assert_eq!(pane.click("Print the board"), [Command::PrintTarget(Page::A4)]);
+            assert_eq!(pane.click("Print the board"), [Command::Target(target::Command::Print(Page::A4))]);
         }
     }
 

@@ -9,8 +9,9 @@ use super::board::{board_ui, number_ui};
 use crate::style::theme::{Palette, Tone};
 use crate::style::{form, parts};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::session;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
 
@@ -34,7 +35,7 @@ fn mode_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let choices =
         [(Mode::EyeInHand, tr!(language, "Eye in hand"), ""), (Mode::EyeToHand, tr!(language, "Eye to hand"), "")];
     if let Some(mode) = form::choice_ui(ui, mode, &choices) {
-        outbox.send(Command::SetMode(mode));
+        outbox.send(session::Command::SetMode(mode));
     }
     parts::hint_ui(
         ui,
@@ -62,7 +63,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ];
     if let Some(fixed) = form::choice_ui(ui, fixed, &choices) {
         let intrinsics = start(model);
-        outbox.send(Command::SetCamera(Some(match camera {
+        outbox.send(session::Command::SetCamera(Some(match camera {
             Some(camera) => CameraInput { fixed, intrinsics: camera.intrinsics.or(Some(intrinsics)), ..camera },
             None => CameraInput { fixed, intrinsics: Some(intrinsics), model: intrinsics.distortion },
         })));
@@ -91,7 +92,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     lens_ui(ui, &mut now, language);
     if now != before {
         let known = CameraInput { fixed: true, intrinsics: Some(now), model: now.distortion };
-        outbox.send(Command::SetCamera(Some(known)));
+        outbox.send(session::Command::SetCamera(Some(known)));
     }
     if let Err(error) = now.validate() {
         form::note_ui(ui, Tone::Bad, tr!(language, "These intrinsics cannot be"), &Text::from(error).say(language));

@@ -23,6 +23,7 @@ use handeye_workbench::settings::SettingsFile;
 use handeye_workbench::text::Text;
 use handeye_workbench::worker::fake::FakeCell;
 use handeye_workbench::worker::{Cell, Clock, PortError, Waker};
+use handeye_workbench::{connect, live, shell};
 
 /// The window over workers that have nothing to say: the tests are the only ones that report.
 pub struct Silent {
@@ -124,7 +125,7 @@ impl Silent {
     }
 
     /// Lets something happen.
-    pub fn absorb(&mut self, event: Event) {
+    pub fn absorb(&mut self, event: impl Into<Event>) {
         self.app().absorb(event);
         self.steps();
     }
@@ -132,7 +133,7 @@ impl Silent {
     /// Both connections are in a state.
     pub fn links(&mut self, state: &LinkState) {
         for link in [Link::Control, Link::Camera] {
-            self.absorb(Event::Link { link, state: state.clone() });
+            self.absorb(connect::Event::Link { link, state: state.clone() });
         }
     }
 
@@ -142,14 +143,14 @@ impl Silent {
     }
 
     /// Does what a pane would ask for.
-    pub fn command(&mut self, command: Command) {
+    pub fn command(&mut self, command: impl Into<Command>) {
         self.harness.state_mut().apply(command);
         self.steps();
     }
 
     /// Brings a pane to the front.
     pub fn show(&mut self, pane: Pane) {
-        self.command(Command::ShowPane(pane));
+        self.command(shell::Command::ShowPane(pane));
     }
 
     /// Presses keys.
@@ -170,7 +171,7 @@ impl Silent {
     pub fn live() -> Self {
         let mut silent = Self::new(CellSource::default());
         silent.links(&connected());
-        silent.absorb(Event::Robot(robot(Simulation::Running)));
+        silent.absorb(connect::Event::Robot(robot(Simulation::Running)));
         silent.absorb(frame(1));
         silent
     }
@@ -222,7 +223,7 @@ pub fn frame(number: u64) -> Event {
         base_from_target_true: None,
         clocks: None,
     };
-    Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) }
+    Event::Live(live::Event::Frame { info, dropped: 7, images: Some(Arc::new(images)) })
 }
 
 #[cfg(test)]

@@ -20,6 +20,10 @@ use crate::recording::Recording;
 use crate::recording::recorded::Recorded;
 use crate::settings::SettingsWrite;
 use crate::worker::{Cell, Clock, FileTask, SessionThreads, StopLine, Waker, Workers};
+use crate::{
+    by_hand, capture, connect, export, guided, import, keep_out, live, messages, motion, recording, scene, session,
+    shell, solve, target, taught, track,
+};
 use handeye_wording::text;
 
 pub use reach::Reach;
@@ -183,121 +187,123 @@ impl App {
     }
 
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
-    pub fn apply(&mut self, command: Command) {
+    pub fn apply(&mut self, command: impl Into<Command>) {
+        let command = command.into();
         if let Some(why) = self.reach.as_ref().and_then(|reach| reach.refusal(&command)) {
             self.say(Severity::Warning, why);
             return;
         }
         match command {
-            Command::Stop => self.stop(),
-            Command::StartSimulation => self.start_simulation(),
-            Command::Reconnect => self.reconnect(),
-            Command::StopTrying => self.stop_trying(),
-            Command::Connect(source) => self.connect(source),
-            Command::Arm(on) => self.arm(on),
-            Command::TypePose(pose) => self.type_pose(Some(pose)),
-            Command::SetObjects(objects) => self.set_objects(objects),
-            Command::SetKeepOut(content) => self.set_keep_out(*content),
-            Command::ImportKeepOut(file) => self.import_keep_out(file),
-            Command::ExportKeepOut(file) => self.export_keep_out(file),
-            Command::PrintTarget(page) => self.print_target(page),
+            Command::Motion(motion::Command::Stop) => self.stop(),
+            Command::Connect(connect::Command::StartSimulation) => self.start_simulation(),
+            Command::Connect(connect::Command::Reconnect) => self.reconnect(),
+            Command::Connect(connect::Command::StopTrying) => self.stop_trying(),
+            Command::Connect(connect::Command::Connect(source)) => self.connect(source),
+            Command::Connect(connect::Command::Arm(on)) => self.arm(on),
+            Command::Connect(connect::Command::TypePose(pose)) => self.type_pose(Some(pose)),
+            Command::Connect(connect::Command::SetObjects(objects)) => self.set_objects(objects),
+            Command::KeepOut(keep_out::Command::Set(content)) => self.set_keep_out(*content),
+            Command::KeepOut(keep_out::Command::Import(file)) => self.import_keep_out(file),
+            Command::KeepOut(keep_out::Command::Export(file)) => self.export_keep_out(file),
+            Command::Target(target::Command::Print(page)) => self.print_target(page),
 
-            Command::SetTheme(theme) => self.model.view.theme = theme,
-            Command::SetLanguage(language) => self.model.view.language = language,
-            Command::SetRotationFormat(format) => self.model.view.rotation = format,
-            Command::SetDepthScale(scale) => self.set_depth_scale(scale),
-            Command::SetDepthColours(colours) => self.set_depth_colours(colours),
-            Command::SetOverlays(overlays) => self.model.view.overlays = overlays,
-            Command::SetViewport(viewport) => self.model.viewport = viewport,
-            Command::SetSceneView(view) => self.model.scene = view,
-            Command::PointAt(point) => self.model.cursor = point,
-            Command::Pick(pixel) => self.pick(pixel),
-            Command::GoToStep(step) => self.model.step = step,
-            Command::SetDialog(dialog) => self.set_dialog(dialog),
-            Command::DismissMessage(number) => self.model.messages.dismiss(number),
+            Command::Shell(shell::Command::SetTheme(theme)) => self.model.view.theme = theme,
+            Command::Shell(shell::Command::SetLanguage(language)) => self.model.view.language = language,
+            Command::Shell(shell::Command::SetRotationFormat(format)) => self.model.view.rotation = format,
+            Command::Live(live::Command::SetDepthScale(scale)) => self.set_depth_scale(scale),
+            Command::Live(live::Command::SetDepthColours(colours)) => self.set_depth_colours(colours),
+            Command::Live(live::Command::SetOverlays(overlays)) => self.model.view.overlays = overlays,
+            Command::Live(live::Command::SetViewport(viewport)) => self.model.viewport = viewport,
+            Command::Scene(scene::Command::SetView(view)) => self.model.scene = view,
+            Command::Live(live::Command::PointAt(point)) => self.model.cursor = point,
+            Command::Live(live::Command::Pick(pixel)) => self.pick(pixel),
+            Command::Shell(shell::Command::GoToStep(step)) => self.model.step = step,
+            Command::Shell(shell::Command::SetDialog(dialog)) => self.set_dialog(dialog),
+            Command::Messages(messages::Command::Dismiss(number)) => self.model.messages.dismiss(number),
             // Where panes are is the window's business.
-            Command::ShowPane(_) | Command::ResetLayout => {}
+            Command::Shell(shell::Command::ShowPane(_) | shell::Command::ResetLayout) => {}
 
-            Command::Move { goal, what } => self.start_motion(goal, what),
-            Command::Jog(jog) => self.jog(jog),
-            Command::JogHeld(jog) => self.hold_jog(jog),
-            Command::JogReleased => self.release_jog(),
-            Command::SetJog(settings) => self.model.view.jog = settings,
-            Command::Teach { name } => self.teach(name),
-            Command::RemoveTaught(name) => self.remove_taught(&name),
-            Command::RenameTaught { from, to } => self.rename_taught(&from, &to),
-            Command::ReorderTaught { name, to } => self.reorder_taught(&name, to),
-            Command::TeachReference => self.teach_reference(),
-            Command::ImportTaught(file) => self.import_taught(file),
-            Command::ExportTaught(file) => self.export_taught(file),
-            Command::AdoptTaught => self.adopt_taught(),
-            Command::GoToTaught(name) => self.visit_taught(&name),
-            Command::GoToCapture(id) => self.go_to_capture(id),
-            Command::RunSequence { purpose } => self.run_sequence(purpose),
-            Command::ContinueSequence => self.continue_sequence(),
-            Command::GoHome => self.go_home(),
-            Command::ResetCell => self.reset_cell(),
-            Command::CalibrateForMe => self.calibrate_for_me(),
-            Command::ConfirmMove => self.confirm_move(),
-            Command::SkipMove => self.skip_move(),
-            Command::SetConfirmMoves(confirm) => self.set_confirm_moves(confirm),
-            Command::GuideByHand => self.guide_by_hand(),
-            Command::SkipView => self.skip_view(),
-            Command::StopGuiding => self.stop_guiding(),
-            Command::VerifyAtPlanned => self.plan_verification(),
-            Command::StopSequence => self.stop_sequence(),
+            Command::Motion(motion::Command::Move { goal, what }) => self.start_motion(goal, what),
+            Command::Motion(motion::Command::Jog(jog)) => self.jog(jog),
+            Command::Motion(motion::Command::JogHeld(jog)) => self.hold_jog(jog),
+            Command::Motion(motion::Command::JogReleased) => self.release_jog(),
+            Command::Motion(motion::Command::SetJog(settings)) => self.model.view.jog = settings,
+            Command::Taught(taught::Command::Teach { name }) => self.teach(name),
+            Command::Taught(taught::Command::Remove(name)) => self.remove_taught(&name),
+            Command::Taught(taught::Command::Rename { from, to }) => self.rename_taught(&from, &to),
+            Command::Taught(taught::Command::Reorder { name, to }) => self.reorder_taught(&name, to),
+            Command::Taught(taught::Command::TeachReference) => self.teach_reference(),
+            Command::Taught(taught::Command::Import(file)) => self.import_taught(file),
+            Command::Taught(taught::Command::Export(file)) => self.export_taught(file),
+            Command::Taught(taught::Command::Adopt) => self.adopt_taught(),
+            Command::Taught(taught::Command::GoTo(name)) => self.visit_taught(&name),
+            Command::Motion(motion::Command::GoToCapture(id)) => self.go_to_capture(id),
+            Command::Taught(taught::Command::RunSequence { purpose }) => self.run_sequence(purpose),
+            Command::Taught(taught::Command::ContinueSequence) => self.continue_sequence(),
+            Command::Motion(motion::Command::GoHome) => self.go_home(),
+            Command::Connect(connect::Command::ResetCell) => self.reset_cell(),
+            Command::Guided(guided::Command::CalibrateForMe) => self.calibrate_for_me(),
+            Command::Motion(motion::Command::ConfirmMove) => self.confirm_move(),
+            Command::Motion(motion::Command::SkipMove) => self.skip_move(),
+            Command::Motion(motion::Command::SetConfirmMoves(confirm)) => self.set_confirm_moves(confirm),
+            Command::ByHand(by_hand::Command::Guide) => self.guide_by_hand(),
+            Command::ByHand(by_hand::Command::SkipView) => self.skip_view(),
+            Command::ByHand(by_hand::Command::StopGuiding) => self.stop_guiding(),
+            Command::Taught(taught::Command::VerifyAtPlanned) => self.plan_verification(),
+            Command::Taught(taught::Command::StopSequence) => self.stop_sequence(),
 
-            Command::Capture(purpose) => self.capture(purpose, None),
-            Command::CancelCapture => self.cancel_capture(),
-            Command::SetCaptureOptions(options) => self.model.view.capture = options,
-            Command::Select(ids) => self.select(ids),
-            Command::BackToLive => self.back_to_live(),
+            Command::Capture(capture::Command::Take(purpose)) => self.capture(purpose, None),
+            Command::Capture(capture::Command::Cancel) => self.cancel_capture(),
+            Command::Capture(capture::Command::SetOptions(options)) => self.model.view.capture = options,
+            Command::Session(session::Command::Select(ids)) => self.select(ids),
+            Command::Session(session::Command::BackToLive) => self.back_to_live(),
 
-            Command::SetExcluded { ids, excluded } => self.set_excluded(ids, excluded),
-            Command::SetPurpose { ids, purpose } => self.set_purpose(ids, purpose),
-            Command::Delete(ids) => self.delete(ids),
-            Command::Undo => self.undo(),
-            Command::Redo => self.redo(),
-            Command::SetTarget(target) => self.set_target(target),
-            Command::SetMode(mode) => self.set_mode(mode),
-            Command::SetCamera(camera) => self.set_camera(camera),
-            Command::NewSession(folder) => self.new_session(folder),
-            Command::Open(folder) => self.open(folder),
-            Command::OpenSample => self.open_sample(),
-            Command::SetImportTarget(typed) => self.set_import_target(typed),
-            Command::SetImportTime(seconds) => self.set_import_time(seconds),
-            Command::FixConvention { key, value } => self.fix_convention(key, value),
-            Command::ChooseHypothesis(place) => self.choose_hypothesis(place),
-            Command::ConvertRecording => self.convert_recording(),
-            Command::ConvertImages => self.convert_images(),
-            Command::SaveAs(folder) => self.save_as(folder),
-            Command::ListFolder(folder) => self.list_folder(folder),
-            Command::OpenFolder(folder) => self.open_folder(folder),
+            Command::Session(session::Command::SetExcluded { ids, excluded }) => self.set_excluded(ids, excluded),
+            Command::Session(session::Command::SetPurpose { ids, purpose }) => self.set_purpose(ids, purpose),
+            Command::Session(session::Command::Delete(ids)) => self.delete(ids),
+            Command::Session(session::Command::Undo) => self.undo(),
+            Command::Session(session::Command::Redo) => self.redo(),
+            Command::Target(target::Command::Set(target)) => self.set_target(target),
+            Command::Session(session::Command::SetMode(mode)) => self.set_mode(mode),
+            Command::Session(session::Command::SetCamera(camera)) => self.set_camera(camera),
+            Command::Session(session::Command::New(folder)) => self.new_session(folder),
+            Command::Session(session::Command::Open(folder)) => self.open(folder),
+            Command::Session(session::Command::OpenSample) => self.open_sample(),
+            Command::Import(import::Command::SetTarget(typed)) => self.set_import_target(typed),
+            Command::Import(import::Command::SetTime(seconds)) => self.set_import_time(seconds),
+            Command::Import(import::Command::FixConvention { key, value }) => self.fix_convention(key, value),
+            Command::Import(import::Command::ChooseHypothesis(place)) => self.choose_hypothesis(place),
+            Command::Import(import::Command::ConvertRecording) => self.convert_recording(),
+            Command::Import(import::Command::ConvertImages) => self.convert_images(),
+            Command::Session(session::Command::SaveAs(folder)) => self.save_as(folder),
+            Command::Session(session::Command::ListFolder(folder)) => self.list_folder(folder),
+            Command::Session(session::Command::OpenFolder(folder)) => self.open_folder(folder),
 
-            Command::Solve => self.solve_again(),
-            Command::CancelSolve => self.cancel_solve(),
-            Command::SetMethod(name) => self.set_method(&name),
-            Command::SetKeepOutliers(keep) => self.set_keep_outliers(keep),
-            Command::SetTipBox(chosen) => self.set_tip_box(chosen),
-            Command::SetGoal(goal) => self.set_goal(goal),
-            Command::SetOutlierLine(line_px) => self.model.outlier_line_px = line_px,
+            Command::Solve(solve::Command::Solve) => self.solve_again(),
+            Command::Solve(solve::Command::Cancel) => self.cancel_solve(),
+            Command::Solve(solve::Command::SetMethod(name)) => self.set_method(&name),
+            Command::Solve(solve::Command::SetKeepOutliers(keep)) => self.set_keep_outliers(keep),
+            Command::Solve(solve::Command::SetTipBox(chosen)) => self.set_tip_box(chosen),
+            Command::Solve(solve::Command::SetGoal(goal)) => self.set_goal(goal),
+            Command::Solve(solve::Command::SetOutlierLine(line_px)) => self.model.outlier_line_px = line_px,
 
-            Command::SetTracking(on) => self.set_tracking(on),
-            Command::SetFollow(wish) => self.set_follow(wish),
-            Command::MoveBoard(motion) => self.move_board(motion),
-            Command::HideBoard(hidden) => self.hide_board(hidden),
-            Command::OpenRerun => self.open_rerun(),
+            Command::Track(track::Command::SetTracking(on)) => self.set_tracking(on),
+            Command::Track(track::Command::SetFollow(wish)) => self.set_follow(wish),
+            Command::Track(track::Command::MoveBoard(motion)) => self.move_board(motion),
+            Command::Track(track::Command::HideBoard(hidden)) => self.hide_board(hidden),
+            Command::Recording(recording::Command::OpenRerun) => self.open_rerun(),
 
-            Command::ChooseFormats(formats) => self.model.export.chosen = formats,
-            Command::ShowFormat(format) => self.model.export.shown = format,
-            Command::SetExportNames(names) => self.set_export_names(names),
-            Command::SetExportFolder(folder) => self.model.export.folder = folder,
-            Command::Export => self.export(),
+            Command::Export(export::Command::ChooseFormats(formats)) => self.model.export.chosen = formats,
+            Command::Export(export::Command::ShowFormat(format)) => self.model.export.shown = format,
+            Command::Export(export::Command::SetNames(names)) => self.set_export_names(names),
+            Command::Export(export::Command::SetFolder(folder)) => self.model.export.folder = folder,
+            Command::Export(export::Command::Export) => self.export(),
         }
     }
 
     /// Takes in what happened.
-    pub fn absorb(&mut self, event: Event) {
+    pub fn absorb(&mut self, event: impl Into<Event>) {
+        let event = event.into();
         self.record(&event);
         match event {
             Event::Tick { now_s } => {
@@ -305,10 +311,10 @@ impl App {
                 self.keep_keep_out(false);
                 self.stop_waits();
             }
-            Event::Standing(standing) => self.standing_found(standing),
-            Event::KeepOutRead(content) => self.keep_out_read(*content),
-            Event::Link { link, state } => self.link_changed(link, state),
-            Event::Robot(robot) => {
+            Event::KeepOut(keep_out::Event::Standing(standing)) => self.standing_found(standing),
+            Event::KeepOut(keep_out::Event::Read(content)) => self.keep_out_read(*content),
+            Event::Connect(connect::Event::Link { link, state }) => self.link_changed(link, state),
+            Event::Connect(connect::Event::Robot(robot)) => {
                 self.model.trail.add(robot.base_from_tip.translation().into());
                 self.stop_seen(&robot);
                 if !robot.joints_rad.is_empty() {
@@ -317,57 +323,63 @@ impl App {
                 self.model.robot = Some(robot);
                 self.model.robot_read_s = Some(self.model.now_s);
             }
-            Event::NoRobot => self.model.robot = None,
-            Event::Cell(facts) => self.cell_found(*facts),
-            Event::Heard { severity, words } => self.heard(severity, words),
-            Event::Stopped => self.stopped(),
-            Event::Frame { info, dropped, images } => {
+            Event::Connect(connect::Event::NoRobot) => self.model.robot = None,
+            Event::Connect(connect::Event::Cell(facts)) => self.cell_found(*facts),
+            Event::Connect(connect::Event::Heard { severity, words }) => self.heard(severity, words),
+            Event::Motion(motion::Event::Stopped) => self.stopped(),
+            Event::Live(live::Event::Frame { info, dropped, images }) => {
                 self.model.dropped_frames = dropped;
                 // A frame out of a log has no pixels, and nothing to show.
                 if let Some(images) = images {
                     self.model.frame = Some(LiveFrame { info, images });
                 }
             }
-            Event::Detection(detection) => {
+            Event::Live(live::Event::Detection(detection)) => {
                 if detection.corners.is_some() {
                     self.model.board_seen_s = Some(self.model.now_s);
                 }
                 self.model.detection = Some(*detection);
                 self.look_by_hand();
             }
-            Event::Moved { id, outcome } => self.moved(id, outcome),
-            Event::Guided { id, outcome } => self.guided_chosen(id, outcome),
-            Event::ViewChosen { number, choice } => self.view_chosen(number, *choice),
-            Event::Planned { id, views } => self.planned(id, views),
-            Event::JogEnded { why } => self.jog_ended(why),
-            Event::CaptureWaits { number, wait } => self.capture_waits(number, wait),
-            Event::CaptureRefused { number, refused } => self.capture_refused(number, refused),
-            Event::Captured { number, id } => {
+            Event::Motion(motion::Event::Moved { id, outcome }) => self.moved(id, outcome),
+            Event::Guided(guided::Event::Chosen { id, outcome }) => self.guided_chosen(id, outcome),
+            Event::ByHand(by_hand::Event::ViewChosen { number, choice }) => self.view_chosen(number, *choice),
+            Event::Taught(taught::Event::Planned { id, views }) => self.planned(id, views),
+            Event::Motion(motion::Event::JogEnded { why }) => self.jog_ended(why),
+            Event::Capture(capture::Event::Waits { number, wait }) => self.capture_waits(number, wait),
+            Event::Capture(capture::Event::Refused { number, refused }) => self.capture_refused(number, refused),
+            Event::Capture(capture::Event::Captured { number, id }) => {
                 self.captured(number, id);
                 self.forget_typed_pose();
             }
-            Event::Document(state) => self.document_changed(*state),
-            Event::SessionOpened { exported } => self.session_opened(exported),
-            Event::SessionFailed { why } => self.session_failed(why),
-            Event::NoSession(path) => self.import(path),
-            Event::ImportProgress { number, work } => self.import_progress(number, work),
-            Event::RecordingLooked { number, found, trouble } => self.recording_looked(number, found, trouble),
-            Event::RecordingConverted { number, converted } => self.recording_converted(number, converted),
-            Event::Observed { id, target, observed } => self.observed(id, target, observed),
-            Event::Review { id, images } => self.reviewed(id, images),
-            Event::Folder(listing) => self.model.folder = Some(listing),
-            Event::Recent(recent) => self.model.recent = recent,
-            Event::PosesRead { poses } => self.poses_read(poses),
-            Event::SolveProgress { job, stage, part } => self.solve_progress(job, stage, part),
-            Event::SolveEnded { job, outcome } => self.solve_ended(job, outcome),
-            Event::Previews(previews) => self.model.export.previews = previews.into_iter().collect(),
-            Event::Exported(written) => self.written(written),
-            Event::Tracked(tracked) => self.tracked(tracked),
-            Event::TrackFailed { why } => self.track_failed(why),
-            Event::Follow(status) => self.follow_goes(status),
-            Event::Rerun(state) => self.model.rerun = state,
-            Event::NoBrowser => self.show_rerun_address(),
-            Event::Notice { severity, text } => self.say(severity, text),
+            Event::Session(session::Event::Document(state)) => self.document_changed(*state),
+            Event::Session(session::Event::Opened { exported }) => self.session_opened(exported),
+            Event::Session(session::Event::Failed { why }) => self.session_failed(why),
+            Event::Import(import::Event::NoSession(path)) => self.import(path),
+            Event::Import(import::Event::Progress { number, work }) => self.import_progress(number, work),
+            Event::Import(import::Event::Looked { number, found, trouble }) => {
+                self.recording_looked(number, found, trouble)
+            }
+            Event::Import(import::Event::Converted { number, converted }) => {
+                self.recording_converted(number, converted)
+            }
+            Event::Session(session::Event::Observed { id, target, observed }) => self.observed(id, target, observed),
+            Event::Session(session::Event::Review { id, images }) => self.reviewed(id, images),
+            Event::Session(session::Event::Folder(listing)) => self.model.folder = Some(listing),
+            Event::Session(session::Event::Recent(recent)) => self.model.recent = recent,
+            Event::Taught(taught::Event::Read { poses }) => self.poses_read(poses),
+            Event::Solve(solve::Event::Progress { job, stage, part }) => self.solve_progress(job, stage, part),
+            Event::Solve(solve::Event::Ended { job, outcome }) => self.solve_ended(job, outcome),
+            Event::Export(export::Event::Previews(previews)) => {
+                self.model.export.previews = previews.into_iter().collect()
+            }
+            Event::Export(export::Event::Written(written)) => self.written(written),
+            Event::Track(track::Event::Tracked(tracked)) => self.tracked(tracked),
+            Event::Track(track::Event::Failed { why }) => self.track_failed(why),
+            Event::Track(track::Event::Follow(status)) => self.follow_goes(status),
+            Event::Recording(recording::Event::Rerun(state)) => self.model.rerun = state,
+            Event::Recording(recording::Event::NoBrowser) => self.show_rerun_address(),
+            Event::Messages(messages::Event::Notice { severity, text }) => self.say(severity, text),
         }
         self.guided_step();
         self.guided_by_hand_step();

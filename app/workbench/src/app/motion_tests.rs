@@ -9,6 +9,7 @@ use crate::model::{CapturePurpose, Drivers, JointFacts, Motion, MotionOutcome, M
 use crate::testing::sample;
 use crate::text::Language;
 use crate::worker::fake::FakeCell;
+use crate::{connect, motion, taught};
 
 /// Connected to the source, with two poses that were taught there.
 fn taught_at(source: CellSource) -> Model {
@@ -52,9 +53,9 @@ fn poses_that_were_taught_on_another_cell_are_not_sent_to_the_arm_that_is_there(
         assert!(model.taught().is_empty());
         let mut bench = bench(&FakeCell::new(0));
         bench.app.replace_model(model);
-        bench.app.apply(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+        bench.app.apply(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
         assert!(!bench.app.model().sequence_runs);
-        bench.app.apply(Command::GoToTaught("left".to_owned()));
+        bench.app.apply(taught::Command::GoTo("left".to_owned()));
         assert_eq!(bench.app.model().motion, Motion::Idle);
         assert_eq!(bench.app.model().asked, None);
     }
@@ -79,29 +80,29 @@ fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() 
     let app = &mut bench.app;
     app.replace_model(taught_at(driver()));
     // Whoever switched this off did so for moves that were seen before.
-    app.apply(Command::SetConfirmMoves(false));
-    app.apply(Command::RunSequence { purpose: None });
+    app.apply(motion::Command::SetConfirmMoves(false));
+    app.apply(taught::Command::RunSequence { purpose: None });
     let asked = app.model().asked.clone().expect("the first move waits");
     assert_eq!(app.model().motion, Motion::Idle);
     assert_eq!(asked.what.say(Language::English), "pose left");
 
-    app.apply(Command::ConfirmMove);
+    app.apply(motion::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
     let id = app.numbers.motion;
-    app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
+    app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
     assert!(app.model().asked.is_none(), "the second goes by itself");
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
 
-    app.apply(Command::Stop);
-    app.apply(Command::ContinueSequence);
+    app.apply(motion::Command::Stop);
+    app.apply(taught::Command::ContinueSequence);
     assert!(app.model().asked.is_some(), "whatever happened meanwhile");
-    app.apply(Command::Stop);
+    app.apply(motion::Command::Stop);
     assert_eq!(app.model().asked, None);
-    app.apply(Command::ConfirmMove);
+    app.apply(motion::Command::ConfirmMove);
     assert!(!app.model().sequence_runs, "nothing begins after a stop");
 
-    app.apply(Command::RunSequence { purpose: None });
-    app.apply(Command::SkipMove);
+    app.apply(taught::Command::RunSequence { purpose: None });
+    app.apply(motion::Command::SkipMove);
     let sequence = app.model().sequence.as_ref().expect("a sequence");
     assert!(matches!(sequence.outcomes[..], [StopOutcome::Skipped(_)]));
     assert!(app.model().asked.is_some(), "the next one is asked for instead");
@@ -114,32 +115,32 @@ fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
     let mut model = sample::solved();
     model.source = driver();
     app.replace_model(model);
-    app.apply(Command::VerifyAtPlanned);
+    app.apply(taught::Command::VerifyAtPlanned);
     let id = app.numbers.motion;
-    app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
+    app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     assert!(app.model().asked.is_some() && app.model().sequence_runs);
-    app.apply(Command::Stop);
+    app.apply(motion::Command::Stop);
 
     let mut robot = app.model().robot.clone().expect("connected");
-    app.absorb(Event::Robot(robot.clone()));
-    app.apply(Command::GoHome);
+    app.absorb(connect::Event::Robot(robot.clone()));
+    app.apply(motion::Command::GoHome);
     assert_eq!(app.model().asked, None, "it is there");
     robot.joints_rad[0] += 0.7;
-    app.absorb(Event::Robot(robot));
+    app.absorb(connect::Event::Robot(robot));
     let id = app.numbers.motion;
-    app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
-    app.apply(Command::GoHome);
+    app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
+    app.apply(motion::Command::GoHome);
     let asked = app.model().asked.clone().expect("it waits");
     let way = crate::motion::way::Way::to(&asked.goal, app.model()).expect("connected");
     assert!(way.joint.is_some_and(|(joint, far)| joint == 0 && (far - 0.7).abs() < 1e-9));
     assert!(way.said(app.model()).say(Language::English).contains("the joint that moves most is J1, by 40.1°"));
-    app.apply(Command::SkipMove);
+    app.apply(motion::Command::SkipMove);
     assert_eq!((&app.model().motion, &app.model().asked), (&Motion::Idle, &None));
 
     let first = app.model().document().captures[0].id;
-    app.apply(Command::GoToCapture(first));
+    app.apply(motion::Command::GoToCapture(first));
     assert!(app.model().asked.is_some());
-    app.apply(Command::ConfirmMove);
+    app.apply(motion::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
 }
 
@@ -148,11 +149,11 @@ fn a_built_in_cell_asks_nothing_unless_somebody_wants_it() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(taught_at(scene(ShippedScene::Reference)));
-    app.apply(Command::RunSequence { purpose: None });
+    app.apply(taught::Command::RunSequence { purpose: None });
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
-    app.apply(Command::Stop);
-    app.apply(Command::SetConfirmMoves(true));
-    app.apply(Command::RunSequence { purpose: None });
+    app.apply(motion::Command::Stop);
+    app.apply(motion::Command::SetConfirmMoves(true));
+    app.apply(taught::Command::RunSequence { purpose: None });
     assert!(app.model().asked.is_some());
 }
 
@@ -161,10 +162,10 @@ fn another_cell_has_no_move_that_waits_and_another_home() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(taught_at(driver()));
-    app.absorb(Event::Robot(app.model().robot.clone().expect("connected")));
-    app.apply(Command::RunSequence { purpose: None });
+    app.absorb(connect::Event::Robot(app.model().robot.clone().expect("connected")));
+    app.apply(taught::Command::RunSequence { purpose: None });
     assert!(app.model().asked.is_some() && app.model().home.is_some());
-    app.apply(Command::Connect(CellSource::Address("tcp://127.0.0.1:9".to_owned())));
+    app.apply(connect::Command::Connect(CellSource::Address("tcp://127.0.0.1:9".to_owned())));
     assert_eq!((&app.model().asked, app.model().home), (&None, None));
 }
 
@@ -176,15 +177,15 @@ fn an_arm_is_said_to_be_stopped_when_its_states_say_so_and_an_alarm_has_the_numb
         let app = &mut bench.app;
         app.replace_model(taught_at(driver()));
         let mut robot = app.model().robot.clone().expect("connected");
-        app.apply(Command::Stop);
-        app.absorb(Event::Stopped);
+        app.apply(motion::Command::Stop);
+        app.absorb(motion::Event::Stopped);
         assert!(app.model().stop_pending && !said(app).contains("stays where it is"), "{}", said(app));
         for i in 1..=22 {
             let now_s = app.model().now_s + 0.1;
             robot.sim_time_s += 0.1;
             let turned: f64 = if goes_on || i < 4 { 34.9 - 4.0 * f64::from(i) } else { 20.0 };
             robot.joints_rad[0] = turned.to_radians();
-            app.absorb(Event::Robot(robot.clone()));
+            app.absorb(connect::Event::Robot(robot.clone()));
             app.absorb(Event::Tick { now_s });
         }
         assert!(!app.model().stop_pending);
@@ -209,7 +210,7 @@ fn without_states_nobody_says_that_the_arm_stands() {
     let mut model = taught_at(driver());
     model.cell.as_mut().expect("connected").moves = Moves::OnceArmed { joints: true, tip: true };
     app.replace_model(model);
-    app.absorb(Event::Stopped);
+    app.absorb(motion::Event::Stopped);
     app.absorb(Event::Tick { now_s: app.model().now_s + 2.5 });
     assert!(said(app).contains("it is not known whether it has"), "{}", said(app));
 }

@@ -7,6 +7,7 @@ use handeye_files::bounds::Bounds;
 use crate::command::Command;
 use crate::model::{CellSource, Drivers};
 use crate::text::Text;
+use crate::{connect, export, keep_out, session, taught};
 use handeye_wording::text;
 
 /// Folders that are read and written for browsers, and programs that are started for them.
@@ -56,16 +57,16 @@ impl Reach {
     /// Why a command is not carried out; `None` if it may be.
     pub fn refusal(&self, command: &Command) -> Option<Text> {
         match command {
-            Command::Open(path)
-            | Command::SaveAs(path)
-            | Command::ListFolder(path)
-            | Command::OpenFolder(path)
-            | Command::NewSession(Some(path))
-            | Command::SetExportFolder(Some(path))
-            | Command::ImportKeepOut(path)
-            | Command::ExportKeepOut(path)
-            | Command::ImportTaught(path)
-            | Command::ExportTaught(path)
+            Command::Session(
+                session::Command::Open(path)
+                | session::Command::SaveAs(path)
+                | session::Command::ListFolder(path)
+                | session::Command::OpenFolder(path)
+                | session::Command::New(Some(path)),
+            )
+            | Command::Export(export::Command::SetFolder(Some(path)))
+            | Command::KeepOut(keep_out::Command::Import(path) | keep_out::Command::Export(path))
+            | Command::Taught(taught::Command::Import(path) | taught::Command::Export(path))
                 if !self.has(path) =>
             {
                 Some(text!(
@@ -73,10 +74,12 @@ impl Reach {
                     path = path.display()
                 ))
             }
-            Command::Connect(CellSource::Drivers(drivers)) if !self.may_start(drivers) => Some(text!(
-                "From a browser no program is started that was not started here before: start `handeye serve` with \
+            Command::Connect(connect::Command::Connect(CellSource::Drivers(drivers))) if !self.may_start(drivers) => {
+                Some(text!(
+                    "From a browser no program is started that was not started here before: start `handeye serve` with \
                  --driver, or give an address tcp://HOST:PORT"
-            )),
+                ))
+            }
             _ => None,
         }
     }
@@ -90,6 +93,8 @@ impl Reach {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    use crate::solve;
 
     #[test]
     fn what_is_outside_is_not_reached_by_any_way() {
@@ -105,9 +110,9 @@ mod tests {
         for path in ["..", "../sessions of others", "out", "out/x", "one/../../x", "new/../../x", "/etc/passwd"] {
             assert!(!reach.has(&inside.join(path)), "{path}");
         }
-        assert!(reach.refusal(&Command::Open(PathBuf::from("/etc"))).is_some());
-        assert!(reach.refusal(&Command::Open(inside)).is_none());
-        assert!(reach.refusal(&Command::Solve).is_none());
+        assert!(reach.refusal(&Command::Session(session::Command::Open(PathBuf::from("/etc")))).is_some());
+        assert!(reach.refusal(&Command::Session(session::Command::Open(inside))).is_none());
+        assert!(reach.refusal(&Command::Solve(solve::Command::Solve)).is_none());
     }
 
     #[test]
@@ -130,7 +135,7 @@ mod tests {
     #[test]
     fn programs_are_started_from_a_browser_only_if_they_were_started_before() {
         let driver = |robot: &str| Drivers { robot: Some(robot.to_owned()), camera: None };
-        let connect = |robot: &str| Command::Connect(CellSource::Drivers(driver(robot)));
+        let connect = |robot: &str| Command::Connect(connect::Command::Connect(CellSource::Drivers(driver(robot))));
         let reach = Reach::default().with_drivers(vec![driver("python3 mine.py")]);
         assert!(reach.refusal(&connect("rm -r /")).is_some());
         assert!(reach.refusal(&connect("python3 mine.py")).is_none());

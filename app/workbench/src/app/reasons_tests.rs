@@ -7,6 +7,7 @@ use crate::model::{CapturePurpose, CaptureRefused, MotionOutcome, Pane, PoseSequ
 use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::worker::fake::FakeCell;
+use crate::{capture, guided, motion, taught};
 use handeye_plan::guided::Ending;
 
 const MANUAL: &str = "The robot refuses: the pendant is in manual mode";
@@ -18,7 +19,7 @@ fn standing(app: &App, pane: Pane) -> String {
 
 fn moved(app: &mut App, outcome: MotionOutcome) {
     let id = app.numbers.motion;
-    app.absorb(Event::Moved { id, outcome });
+    app.absorb(motion::Event::Moved { id, outcome });
 }
 
 fn refuse(app: &mut App) {
@@ -30,7 +31,7 @@ fn a_robot_that_does_not_make_the_first_move_of_guided_capture_says_why_and_not_
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::connected());
-    app.apply(Command::CalibrateForMe);
+    app.apply(guided::Command::CalibrateForMe);
     refuse(app);
     assert!(!app.model().sequence_runs);
     assert_eq!(standing(app, Pane::Poses), MANUAL);
@@ -41,7 +42,7 @@ fn one_move_that_is_refused_is_a_pose_left_out_and_two_in_a_row_break_guided_cap
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(Command::CalibrateForMe);
+    app.apply(guided::Command::CalibrateForMe);
     choose(app);
     refuse(app);
     let sequence = app.model().sequence.clone().expect("a sequence");
@@ -50,7 +51,7 @@ fn one_move_that_is_refused_is_a_pose_left_out_and_two_in_a_row_break_guided_cap
     moved(app, MotionOutcome::Arrived);
     let number = app.numbers.capture;
     let why = Text::verbatim("blurred");
-    app.absorb(Event::CaptureRefused {
+    app.absorb(capture::Event::Refused {
         number,
         refused: CaptureRefused { kind: RefusalKind::Blurred, why, at_s: 3.0 },
     });
@@ -61,7 +62,7 @@ fn one_move_that_is_refused_is_a_pose_left_out_and_two_in_a_row_break_guided_cap
     refuse(app);
     assert!(!app.model().sequence_runs);
     assert!(standing(app, Pane::Poses).ends_with(MANUAL), "{}", standing(app, Pane::Poses));
-    app.apply(Command::ContinueSequence);
+    app.apply(taught::Command::ContinueSequence);
     assert!(app.model().sequence_runs, "once the pendant is in automatic mode");
 }
 
@@ -70,17 +71,17 @@ fn a_sequence_that_is_broken_off_says_why_in_its_pane() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(Command::VerifyAtPlanned);
+    app.apply(taught::Command::VerifyAtPlanned);
     let id = app.numbers.motion;
-    app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
+    app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     moved(app, MotionOutcome::Failed(Text::verbatim("The robot stopped: protective stop")));
     assert!(standing(app, Pane::Verify).ends_with("protective stop"), "{}", standing(app, Pane::Verify));
 
-    app.apply(Command::ContinueSequence);
+    app.apply(taught::Command::ContinueSequence);
     moved(app, MotionOutcome::Arrived);
     let number = app.numbers.capture;
     let why = Text::verbatim("No images have come for 5 s");
-    app.absorb(Event::CaptureRefused {
+    app.absorb(capture::Event::Refused {
         number,
         refused: CaptureRefused { kind: RefusalKind::NoImages, why, at_s: 3.0 },
     });
@@ -93,15 +94,15 @@ fn poses_that_check_the_answer_are_gone_on_with_as_the_others_are() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(Command::CalibrateForMe);
+    app.apply(guided::Command::CalibrateForMe);
     let sequence = app.model.sequence.as_mut().expect("a sequence");
     sequence.purpose = Some(CapturePurpose::Verify);
     let guided = sequence.guided.as_deref_mut().expect("guided");
     (guided.ending, guided.waits) = (Some(Ending::GoalReached { error_m: 3e-4 }), Waits::Nothing);
-    app.apply(Command::Stop);
+    app.apply(motion::Command::Stop);
     assert!(!app.model().sequence_runs);
     assert!(app.model().sequence.as_ref().is_some_and(PoseSequence::can_continue));
-    app.apply(Command::ContinueSequence);
+    app.apply(taught::Command::ContinueSequence);
     assert!(app.model().sequence_runs && matches!(waits(app), Some(Waits::Answer | Waits::Choice)));
     let guided = app.model().sequence.as_ref().and_then(|it| it.guided.as_deref()).expect("guided");
     assert!(guided.ending.is_some(), "with the checks, not with more poses for the fit");

@@ -21,6 +21,7 @@ use crate::model::{
 use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
+use crate::{capture, connect, guided, live, motion, recording, scene, session, shell, solve, taught, track};
 use handeye_cell::scene::{SceneChoice, ShippedScene};
 use handeye_coppeliasim::cell::ArmKinematics;
 
@@ -70,16 +71,16 @@ fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_addres
     let connected = LinkState::Connected { server: "a cell".to_owned(), address: "tcp://127.0.0.1:9".to_owned() };
     let panda = CellPaths::below("Panda");
     bench.app.model.control = connected.clone();
-    bench.app.apply(Command::SetObjects(panda.clone()));
-    bench.app.apply(Command::Reconnect);
+    bench.app.apply(connect::Command::SetObjects(panda.clone()));
+    bench.app.apply(connect::Command::Reconnect);
     assert_eq!(made.lock().expect("whole").len(), 1, "the cell of the start goes on");
 
     let address = CellSource::Address("tcp://127.0.0.1:9".to_owned());
-    bench.app.apply(Command::Connect(address.clone()));
+    bench.app.apply(connect::Command::Connect(address.clone()));
     let xarm = CellPaths::below("xArm");
-    bench.app.apply(Command::SetObjects(xarm.clone()));
+    bench.app.apply(connect::Command::SetObjects(xarm.clone()));
     bench.app.model.control = connected;
-    bench.app.apply(Command::Reconnect);
+    bench.app.apply(connect::Command::Reconnect);
     let made = made.lock().expect("whole")[1..].to_vec();
     assert_eq!(made, [(address.clone(), panda), (address.clone(), xarm.clone()), (address, xarm)]);
 }
@@ -92,16 +93,16 @@ fn commands_return_at_once_while_the_cell_never_answers() {
     let jog = Jog::Joint { index: 0, forward: true };
     for _ in 0..50 {
         for command in [
-            Command::Stop,
-            Command::StartSimulation,
-            Command::Reconnect,
-            Command::SetDepthScale(DepthScale::Full),
-            Command::SetTheme(ThemeChoice::Light),
-            Command::JogHeld(jog),
-            Command::JogReleased,
-            Command::Capture(CapturePurpose::Calibrate),
-            Command::GoToTaught("P1".to_owned()),
-            Command::Solve,
+            Command::Motion(motion::Command::Stop),
+            Command::Connect(connect::Command::StartSimulation),
+            Command::Connect(connect::Command::Reconnect),
+            Command::Live(live::Command::SetDepthScale(DepthScale::Full)),
+            Command::Shell(shell::Command::SetTheme(ThemeChoice::Light)),
+            Command::Motion(motion::Command::JogHeld(jog)),
+            Command::Motion(motion::Command::JogReleased),
+            Command::Capture(capture::Command::Take(CapturePurpose::Calibrate)),
+            Command::Taught(taught::Command::GoTo("P1".to_owned())),
+            Command::Solve(solve::Command::Solve),
         ] {
             bench.app.apply(command);
             bench.app.collect();
@@ -117,23 +118,23 @@ fn a_lost_connection_is_said_and_a_retry_does_not_hide_why() {
     let mut bench = bench(&FakeCell::new(0));
     let connected = LinkState::Connected { address: "tcp://a:1".to_owned(), server: "sim".to_owned() };
     let why = Text::verbatim("the cable is out");
-    bench.app.absorb(Event::Link { link: Link::Camera, state: connected });
+    bench.app.absorb(connect::Event::Link { link: Link::Camera, state: connected });
     let lost = LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0, next_s: 1.5 };
-    bench.app.absorb(Event::Link { link: Link::Camera, state: lost });
+    bench.app.absorb(connect::Event::Link { link: Link::Camera, state: lost });
     assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
     let retrying = LinkState::Retrying { since_s: 1.0, why, attempt: 1 };
-    bench.app.absorb(Event::Link { link: Link::Camera, state: retrying });
+    bench.app.absorb(connect::Event::Link { link: Link::Camera, state: retrying });
     assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
 }
 
 #[test]
 fn a_stop_without_connection_points_to_the_emergency_stop() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.absorb(Event::Link { link: Link::Control, state: LinkState::StartingCell { why: None } });
-    bench.app.apply(Command::Stop);
+    bench.app.absorb(connect::Event::Link { link: Link::Control, state: LinkState::StartingCell { why: None } });
+    bench.app.apply(motion::Command::Stop);
     assert!(said(&bench.app).contains("emergency stop"), "{}", said(&bench.app));
     assert!(bench.app.model().stop_pending);
-    bench.app.absorb(Event::Stopped);
+    bench.app.absorb(motion::Event::Stopped);
     assert!(bench.app.model().stop_pending, "nobody has said that it stands");
 }
 
@@ -154,7 +155,7 @@ fn leaving_brakes_an_arm_that_it_moves_and_leaves_the_arm_of_others_alone() {
         until(&mut bench.app, &|model| model.control.is_connected() && model.mover.is_connected());
         if moves {
             let goal = MotionGoal::Joints([0.5; 6].into());
-            bench.app.apply(Command::Move { goal, what: Text::verbatim("there") });
+            bench.app.apply(motion::Command::Move { goal, what: Text::verbatim("there") });
             until(&mut bench.app, &|_| !cell.script().moved.is_empty());
         }
         let began = Instant::now();
@@ -169,7 +170,7 @@ fn leaving_brakes_an_arm_that_it_moves_and_leaves_the_arm_of_others_alone() {
 fn leaving_ends_in_time_while_the_cell_never_answers() {
     let (cell, release) = FakeCell::that_never_answers();
     let mut bench = bench(&cell);
-    bench.app.apply(Command::Stop);
+    bench.app.apply(motion::Command::Stop);
     bench.app.collect();
     let began = Instant::now();
     drop(bench);
@@ -180,31 +181,35 @@ fn leaving_ends_in_time_while_the_cell_never_answers() {
 #[test]
 fn where_no_browser_opens_the_address_is_shown_but_never_in_place_of_what_is_in_use() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.absorb(Event::NoBrowser);
+    bench.app.absorb(recording::Event::NoBrowser);
     assert_eq!(bench.app.model().dialog, Some(Dialog::RerunAddress));
-    bench.app.apply(Command::SetDialog(Some(Dialog::SaveAs)));
-    bench.app.absorb(Event::NoBrowser);
+    bench.app.apply(shell::Command::SetDialog(Some(Dialog::SaveAs)));
+    bench.app.absorb(recording::Event::NoBrowser);
     assert_eq!(bench.app.model().dialog, Some(Dialog::SaveAs));
 }
 
 #[test]
 fn commands_and_events_survive_being_written_down() {
     let commands = [
-        Command::Stop,
-        Command::PointAt(None),
-        Command::SetTheme(ThemeChoice::Light),
-        Command::Delete(vec![CaptureId(3)]),
-        Command::RunSequence { purpose: Some(CapturePurpose::Verify) },
-        Command::SetFollow(Some(FollowWish::KeepViewWithRoom)),
-        Command::VerifyAtPlanned,
+        Command::Motion(motion::Command::Stop),
+        Command::Live(live::Command::PointAt(None)),
+        Command::Shell(shell::Command::SetTheme(ThemeChoice::Light)),
+        Command::Session(session::Command::Delete(vec![CaptureId(3)])),
+        Command::Taught(taught::Command::RunSequence { purpose: Some(CapturePurpose::Verify) }),
+        Command::Track(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom))),
+        Command::Taught(taught::Command::VerifyAtPlanned),
     ];
     for command in commands {
         let text = serde_json::to_string(&command).expect("it can be written");
         assert_eq!(serde_json::from_str::<Command>(&text).expect("it can be read"), command);
     }
     let state = LinkState::Lost { since_s: 1.5, why: Text::verbatim("gone"), attempt: 2, next_s: 2.0 };
-    let text = serde_json::to_string(&Event::Link { link: Link::Control, state: state.clone() }).expect("written");
-    let Event::Link { state: read, .. } = serde_json::from_str(&text).expect("read") else { panic!("another event") };
+    let text =
+        serde_json::to_string(&Event::Connect(connect::Event::Link { link: Link::Control, state: state.clone() }))
+            .expect("written");
+    let Event::Connect(connect::Event::Link { state: read, .. }) = serde_json::from_str(&text).expect("read") else {
+        panic!("another event")
+    };
     assert_eq!(read, state);
 }
 
@@ -216,13 +221,13 @@ fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_sequence() {
     bench.app.model.sequence =
         Some(PoseSequence { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0, guided: None });
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
+    bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
     let sequence = bench.app.model().sequence.clone().expect("the sequence");
     assert!(matches!(sequence.outcomes.as_slice(), [StopOutcome::Skipped(_), ..]), "{sequence:?}");
 
     bench.app.model.sequence_runs = true;
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
+    bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Stopped });
     assert!(!bench.app.model().sequence_runs);
     assert_eq!(bench.app.model().motion, Motion::Idle);
 }
@@ -231,29 +236,29 @@ fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_sequence() {
 fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_capture() {
     let mut bench = bench(&FakeCell::new(0));
     bench.app.replace_model(sample::solved());
-    bench.app.apply(Command::VerifyAtPlanned);
+    bench.app.apply(taught::Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
+    bench.app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Arrived });
+    bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
     let number = bench.app.numbers.capture;
     let why = Text::verbatim("the simulation is paused");
     let refused = CaptureRefused { kind: RefusalKind::Paused, why, at_s: 3.0 };
-    bench.app.absorb(Event::CaptureRefused { number, refused });
+    bench.app.absorb(capture::Event::Refused { number, refused });
     let sequence = bench.app.model().sequence.clone().expect("a sequence");
     assert!(!bench.app.model().sequence_runs);
     assert_eq!(sequence.outcomes, [], "the pose is not left out");
 
-    bench.app.apply(Command::ContinueSequence);
+    bench.app.apply(taught::Command::ContinueSequence);
     assert!(bench.app.model().sequence_runs);
     assert!(matches!(bench.app.model().motion, Motion::Moving { .. }), "it is on its way to the first again");
 
-    bench.app.apply(Command::Stop);
+    bench.app.apply(motion::Command::Stop);
     let mut another = bench.app.model().session.clone();
-    bench.app.absorb(Event::Document(Box::new(another.clone())));
+    bench.app.absorb(session::Event::Document(Box::new(another.clone())));
     another.folder = Some(PathBuf::from("another session"));
-    bench.app.absorb(Event::Document(Box::new(another)));
-    bench.app.apply(Command::ContinueSequence);
+    bench.app.absorb(session::Event::Document(Box::new(another)));
+    bench.app.apply(taught::Command::ContinueSequence);
     assert!(!bench.app.model().sequence_runs, "its poses are those of another session");
 }
 
@@ -275,7 +280,10 @@ pub(super) fn choose(app: &mut App) {
     let step = ChosenStep::Next(Box::new(Next::Go { plan, why }));
     let guide = guided.guide.clone();
     let chosen_at = app.model.robot.as_ref().expect("connected").joints_rad;
-    app.absorb(Event::Guided { id, outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3), chosen_at })) });
+    app.absorb(guided::Event::Chosen {
+        id,
+        outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3), chosen_at })),
+    });
 }
 
 pub(super) fn waits(app: &App) -> Option<Waits> {
@@ -289,21 +297,21 @@ fn a_chosen_pose_waits_for_a_person_wherever_there_may_be_a_real_arm() {
     let mut model = sample::solved();
     model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
     app.replace_model(model);
-    app.apply(Command::CalibrateForMe);
+    app.apply(guided::Command::CalibrateForMe);
     choose(app);
     assert!(app.model().asked.is_some());
     assert_eq!(app.model().motion, Motion::Idle);
 
-    app.apply(Command::SkipMove);
+    app.apply(motion::Command::SkipMove);
     assert!(app.model().asked.is_none() && waits(app) != Some(Waits::Nothing), "another one is chosen");
     assert_eq!(app.model().motion, Motion::Idle);
 
     choose(app);
-    app.apply(Command::ConfirmMove);
+    app.apply(motion::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
-    app.apply(Command::Stop);
+    app.apply(motion::Command::Stop);
     assert!(!app.model().sequence_runs);
-    app.apply(Command::ConfirmMove);
+    app.apply(motion::Command::ConfirmMove);
     assert!(!app.model().sequence_runs, "nothing begins after a stop");
 }
 
@@ -314,7 +322,7 @@ fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
     let app = &mut bench.app;
     app.replace_model(sample::solved());
     let judged_over = |app: &mut App| {
-        app.apply(Command::CalibrateForMe);
+        app.apply(guided::Command::CalibrateForMe);
         // The answer that there is stands for the one from the present method.
         app.model.solve.status = SolveStatus::Idle;
         app.model.solve.fresh = true;
@@ -324,8 +332,8 @@ fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
         guided.guide.options().tool_box
     };
     assert_eq!(judged_over(app), None);
-    app.apply(Command::Stop);
-    app.apply(Command::SetTipBox(Some(WorkBox { from_m: [0.3, 0.0, 0.0], to_m: [0.5, 0.2, 0.1] })));
+    app.apply(motion::Command::Stop);
+    app.apply(solve::Command::SetTipBox(Some(WorkBox { from_m: [0.3, 0.0, 0.0], to_m: [0.5, 0.2, 0.1] })));
     let [low, high] = judged_over(app).expect("a box").bounds();
     assert_eq!((low.coords.as_slice(), high.coords.as_slice()), (&[0.3, 0.0, 0.0][..], &[0.5, 0.2, 0.1][..]));
 }
@@ -336,20 +344,20 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(Command::SetConfirmMoves(true));
-    app.apply(Command::CalibrateForMe);
+    app.apply(motion::Command::SetConfirmMoves(true));
+    app.apply(guided::Command::CalibrateForMe);
     choose(app);
     let mut robot = app.model().robot.clone().expect("connected");
     let mut joints = robot.joints_rad.to_vec();
     joints[0] += 0.02;
     robot.joints_rad = JointValues::try_from(&joints[..]).expect("six");
-    app.absorb(Event::Robot(robot));
-    app.apply(Command::ConfirmMove);
+    app.absorb(connect::Event::Robot(robot));
+    app.apply(motion::Command::ConfirmMove);
     assert_eq!(app.model().motion, Motion::Idle);
     assert!(said(app).contains("elsewhere"), "{}", said(app));
     // Without confirmation the one that waits begins at once.
     choose(app);
-    app.apply(Command::SetConfirmMoves(false));
+    app.apply(motion::Command::SetConfirmMoves(false));
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
 }
 
@@ -359,14 +367,14 @@ fn a_pose_that_was_chosen_by_a_chain_that_does_not_fit_any_more_is_not_driven_to
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(sample::solved());
-    app.apply(Command::SetConfirmMoves(true));
-    app.apply(Command::CalibrateForMe);
+    app.apply(motion::Command::SetConfirmMoves(true));
+    app.apply(guided::Command::CalibrateForMe);
     choose(app);
     let cell = app.model().cell.clone().expect("connected");
     let doubt = ArmDoubt::Foreign { distance_m: 0.05, angle_rad: 0.0 };
-    app.absorb(Event::Cell(Box::new(CellFacts { arm: None, arm_doubt: Some(doubt), ..cell })));
+    app.absorb(connect::Event::Cell(Box::new(CellFacts { arm: None, arm_doubt: Some(doubt), ..cell })));
     assert!(!app.model().sequence_runs);
-    app.apply(Command::ConfirmMove);
+    app.apply(motion::Command::ConfirmMove);
     assert_eq!(app.model().motion, Motion::Idle);
 }
 
@@ -380,8 +388,12 @@ fn led(ending: Option<Ending>) -> Model {
 
 #[test]
 fn nobody_is_led_any_longer_once_the_arm_goes_by_itself_or_is_another_one() {
-    let another = Command::Connect(CellSource::Address("tcp://127.0.0.1:9".to_owned()));
-    for command in [Command::CalibrateForMe, another, Command::SetMode(Mode::EyeToHand)] {
+    let another = Command::Connect(connect::Command::Connect(CellSource::Address("tcp://127.0.0.1:9".to_owned())));
+    for command in [
+        Command::Guided(guided::Command::CalibrateForMe),
+        another,
+        Command::Session(session::Command::SetMode(Mode::EyeToHand)),
+    ] {
         let mut bench = bench(&FakeCell::new(0));
         bench.app.replace_model(led(None));
         bench.app.apply(command.clone());
@@ -396,7 +408,7 @@ fn only_a_capture_for_verification_checks_an_answer_by_hand() {
     let checked = |app: &App| app.model().by_hand.as_ref().map(|hand| hand.checked);
     let of = |app: &App, role| app.model().document().captures.iter().find(|it| it.role == role).map(|it| it.id);
     let calibrates = of(&bench.app, Role::Calibration).expect("a capture in the fit");
-    bench.app.absorb(Event::Captured { number: 99, id: calibrates });
+    bench.app.absorb(capture::Event::Captured { number: 99, id: calibrates });
     assert_eq!(checked(&bench.app), Some(0));
     bench.app.captured_by_hand(Some(Role::Verification));
     assert_eq!(checked(&bench.app), Some(1));
@@ -433,7 +445,7 @@ fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
     let stand = |app: &mut App, seen: &LiveDetection| {
         for _ in 0..2 {
             app.absorb(Event::Tick { now_s: app.model.now_s + 0.5 });
-            app.absorb(Event::Detection(Box::new(seen.clone())));
+            app.absorb(live::Event::Detection(Box::new(seen.clone())));
         }
         app.model.capture.is_some()
     };
@@ -441,7 +453,7 @@ fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
     let number = app.numbers.capture;
     let why = Text::verbatim("too similar");
     let refused = CaptureRefused { kind: RefusalKind::TooSimilar, why, at_s: 3.0 };
-    app.absorb(Event::CaptureRefused { number, refused });
+    app.absorb(capture::Event::Refused { number, refused });
     assert!(!stand(app, &seen), "the same place");
     let at = seen.base_from_tip.expect("the robot is known");
     let moved = Pose::from_isometry(*at.isometry() * nalgebra::Translation3::new(0.0, 0.0, 0.05));
@@ -451,12 +463,12 @@ fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
 #[test]
 fn keeping_all_views_is_another_question_and_is_solved_at_once() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.apply(Command::SetKeepOutliers(true));
+    bench.app.apply(solve::Command::SetKeepOutliers(true));
     assert!(bench.app.model().keep_outliers);
     let asked = bench.app.numbers.job;
-    bench.app.apply(Command::SetKeepOutliers(true));
+    bench.app.apply(solve::Command::SetKeepOutliers(true));
     assert_eq!(bench.app.numbers.job, asked, "the same question is not asked twice");
-    bench.app.apply(Command::SetKeepOutliers(false));
+    bench.app.apply(solve::Command::SetKeepOutliers(false));
     assert_ne!(bench.app.numbers.job, asked);
 }
 
@@ -465,8 +477,8 @@ fn an_answer_to_an_earlier_question_is_not_shown() {
     let mut bench = bench(&FakeCell::new(0));
     bench.app.numbers.job = JobId(7);
     bench.app.model.solve.status = SolveStatus::Idle;
-    let outcome = crate::command::SolveOutcome::Failed(Text::verbatim("old"));
-    bench.app.absorb(Event::SolveEnded { job: JobId(6), outcome });
+    let outcome = crate::solve::SolveOutcome::Failed(Text::verbatim("old"));
+    bench.app.absorb(solve::Event::Ended { job: JobId(6), outcome });
     assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
 }
 
@@ -475,52 +487,52 @@ fn an_answer_of_the_session_before_does_not_get_into_another_one() {
     let mut bench = bench(&FakeCell::new(0));
     let mut state = bench.app.model().session.clone();
     state.folder = Some(PathBuf::from("first"));
-    bench.app.absorb(Event::Document(Box::new(state.clone())));
+    bench.app.absorb(session::Event::Document(Box::new(state.clone())));
     let job = bench.app.numbers.job;
     // Its captures have yet to be looked at, so that nothing new is solved before the old answer comes.
     state.folder = Some(PathBuf::from("second"));
     state.document = sample::captured().session.document;
-    bench.app.absorb(Event::Document(Box::new(state)));
-    let outcome = crate::command::SolveOutcome::Failed(Text::verbatim("of the first session"));
-    bench.app.absorb(Event::SolveEnded { job, outcome });
+    bench.app.absorb(session::Event::Document(Box::new(state)));
+    let outcome = crate::solve::SolveOutcome::Failed(Text::verbatim("of the first session"));
+    bench.app.absorb(solve::Event::Ended { job, outcome });
     assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
 }
 
 #[test]
 fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_leaves_nothing_that_begins() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.apply(Command::VerifyAtPlanned);
+    bench.app.apply(taught::Command::VerifyAtPlanned);
     assert!(!bench.app.model().planning, "there is no calibration");
     assert_eq!(bench.app.model().messages.newest().map(|it| it.home), Some(Home::Pane(Pane::Verify)));
 
     bench.app.replace_model(sample::solved());
-    bench.app.apply(Command::VerifyAtPlanned);
+    bench.app.apply(taught::Command::VerifyAtPlanned);
     assert!(bench.app.model().planning);
     let id = bench.app.numbers.motion;
-    bench.app.apply(Command::Stop);
+    bench.app.apply(motion::Command::Stop);
     assert!(!bench.app.model().planning);
-    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
+    bench.app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     assert!(!bench.app.model().sequence_runs, "it was stopped");
 
-    bench.app.apply(Command::VerifyAtPlanned);
+    bench.app.apply(taught::Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
-    bench.app.absorb(Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
+    bench.app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     let sequence = bench.app.model().sequence.clone().expect("a sequence");
     assert!(bench.app.model().sequence_runs && !bench.app.model().planning);
     assert_eq!(sequence.names, ["V1", "V2", "V3"]);
     assert_eq!(sequence.purpose, Some(CapturePurpose::Verify));
     assert!(matches!(bench.app.model().motion, Motion::Moving { .. }), "it is on its way to the first");
-    bench.app.apply(Command::StopSequence);
+    bench.app.apply(taught::Command::StopSequence);
     assert!(!bench.app.model().sequence_runs);
 
-    bench.app.apply(Command::VerifyAtPlanned);
+    bench.app.apply(taught::Command::VerifyAtPlanned);
     let id = bench.app.numbers.motion;
     // A motion that is asked for meanwhile is refused, and the poses still come.
-    bench.app.apply(Command::GoToCapture(CaptureId(1)));
+    bench.app.apply(motion::Command::GoToCapture(CaptureId(1)));
     let other = bench.app.numbers.motion;
-    bench.app.absorb(Event::Moved { id: other, outcome: MotionOutcome::Refused(Text::verbatim("busy")) });
+    bench.app.absorb(motion::Event::Moved { id: other, outcome: MotionOutcome::Refused(Text::verbatim("busy")) });
     assert!(bench.app.model().planning);
-    bench.app.absorb(Event::Planned { id, views: Err(Text::verbatim("the board is too far")) });
+    bench.app.absorb(taught::Event::Planned { id, views: Err(Text::verbatim("the board is too far")) });
     assert!(!bench.app.model().planning && !bench.app.model().sequence_runs);
     assert_eq!(said(&bench.app), "There are no poses to verify at: the board is too far");
 }
@@ -531,17 +543,19 @@ fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning()
     let mut model = sample::tracking();
     model.track.follow = FollowStatus::Off;
     bench.app.replace_model(model);
-    bench.app.apply(Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    bench.app.apply(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
     let id = bench.app.numbers.follow.expect("it follows");
-    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Failed(Text::verbatim("joint 3 is at its limit")) });
+    bench
+        .app
+        .absorb(motion::Event::Moved { id, outcome: MotionOutcome::Failed(Text::verbatim("joint 3 is at its limit")) });
     let newest = bench.app.model().messages.newest().expect("said").clone();
     assert_eq!((newest.home, newest.severity), (Home::Pane(Pane::Track), crate::model::Severity::Warning));
     assert!(matches!(bench.app.model().track.follow, FollowStatus::Ended(_)));
 
-    bench.app.apply(Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    bench.app.apply(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
     assert_eq!(bench.app.model().track.follow, FollowStatus::Off, "the reason before is no longer so");
     let id = bench.app.numbers.follow.expect("it follows");
-    bench.app.absorb(Event::Moved { id, outcome: MotionOutcome::Stopped });
+    bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Stopped });
     assert_eq!(bench.app.model().messages.newest().map(|it| it.home), Some(Home::StatusLine));
 }
 
@@ -559,20 +573,20 @@ fn the_view_in_3d_is_fitted_to_every_cell_once_and_then_left_as_a_person_turned_
     };
     let mut bench = bench(&FakeCell::new(0));
     let (cell, robot) = facts(ShippedScene::Reference);
-    bench.app.absorb(Event::Cell(Box::new(cell)));
-    bench.app.absorb(Event::Robot(robot.clone()));
+    bench.app.absorb(connect::Event::Cell(Box::new(cell)));
+    bench.app.absorb(connect::Event::Robot(robot.clone()));
     let first = bench.app.model().scene;
     assert_eq!(Some(first), crate::scene::fitted_view(bench.app.model()));
     let turned = SceneView { azimuth_rad: 1.0, distance_m: 0.5, ..first };
-    bench.app.apply(Command::SetSceneView(turned));
-    bench.app.absorb(Event::Robot(robot));
+    bench.app.apply(scene::Command::SetView(turned));
+    bench.app.absorb(connect::Event::Robot(robot));
     assert_eq!(bench.app.model().scene, turned, "a person looks at something");
 
-    bench.app.apply(Command::Connect(CellSource::BuiltIn(SceneChoice::Shipped(ShippedScene::Panda))));
+    bench.app.apply(connect::Command::Connect(CellSource::BuiltIn(SceneChoice::Shipped(ShippedScene::Panda))));
     let (cell, robot) = facts(ShippedScene::Panda);
-    bench.app.absorb(Event::Robot(robot.clone()));
+    bench.app.absorb(connect::Event::Robot(robot.clone()));
     assert_eq!(bench.app.model().scene, turned, "what it looks like is not known yet");
-    bench.app.absorb(Event::Cell(Box::new(cell)));
+    bench.app.absorb(connect::Event::Cell(Box::new(cell)));
     let second = bench.app.model().scene;
     assert_eq!(Some(second), crate::scene::fitted_view(bench.app.model()));
     assert!(second != turned && second != first, "{second:?}");

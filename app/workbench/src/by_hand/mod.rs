@@ -4,6 +4,9 @@
 //! [`handeye_plan::guided::by_hand`] chooses and judges the views, on a thread of its own: no connection of the arm is
 //! needed beside what says where it is.
 
+pub mod command;
 pub mod state;
 mod update;
 pub(crate) mod worker;
+
+pub use command::{Command, Event};

@@ -11,7 +11,7 @@ use handeye_plan::guided::Known;
 use handeye_plan::guided::by_hand::{HandGuide, HandNext};
 
 use super::state::HandChoice;
-use crate::command::Event;
+use crate::by_hand;
 use crate::model::Solved;
 use crate::worker::link::Outlet;
 
@@ -45,7 +45,7 @@ pub fn choose(job: &HandJob, cancel: &CancelToken, outlet: &Outlet) {
         None
     });
     if !cancel.is_cancelled() {
-        outlet.report(Event::ViewChosen { number: job.number, choice: Box::new(HandChoice { guide, next }) });
+        outlet.report(by_hand::Event::ViewChosen { number: job.number, choice: Box::new(HandChoice { guide, next }) });
     }
 }
 

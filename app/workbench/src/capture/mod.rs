@@ -10,6 +10,7 @@
 //!
 //! What is decided on the way (at rest, sharp, too similar) is decided in [`handeye_capture`].
 
+pub mod command;
 mod measured;
 pub mod refusal;
 mod request;
@@ -18,6 +19,7 @@ pub(crate) mod state;
 mod take;
 pub(crate) mod update;
 
+pub use command::{Command, Event};
 pub use measured::{Measured, thumbnail};
 pub use request::CaptureRequest;
 pub use sequence::Sequence;

@@ -1,9 +1,12 @@
 //! The connection to a cell: choosing it, its state, starting and stopping its simulation.
 
+pub mod command;
 pub mod offered;
 pub mod stop_line;
 pub(crate) mod update;
 pub(crate) mod worker;
+
+pub use command::{Command, Event};
 
 use crate::model::CellSource;
 use crate::text::Text;

@@ -8,11 +8,11 @@ use handeye_driver::LogLevel;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::stop_line::StopLine;
-use crate::command::Event;
 use crate::model::{BoardMotion, CellSource, Link, RobotState, Severity, Simulation};
 use crate::worker::MAX_EVENTS;
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::slot::LatestSlot;
+use crate::{connect, motion};
 use handeye_link::{Cell, Connected, ControlPort, PortError};
 use handeye_wording::text;
 
@@ -60,7 +60,7 @@ impl Control {
         match port.stop() {
             Ok(()) => {
                 self.stop.finish(number);
-                outlet.report(Event::Stopped);
+                outlet.report(motion::Event::Stopped);
                 Ok(())
             }
             Err(error) => {
@@ -90,7 +90,7 @@ impl Duty for Control {
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError> {
         self.stop_if_pressed(port.as_mut(), outlet)?;
         if std::mem::take(&mut self.owes_facts) || port.facts_differ() {
-            outlet.report(Event::Cell(Box::new(port.facts()?)));
+            outlet.report(connect::Event::Cell(Box::new(port.facts()?)));
         }
         for (level, words) in port.heard() {
             let severity = match level {
@@ -100,7 +100,7 @@ impl Duty for Control {
                 LogLevel::Debug => continue,
             };
             if outlet.events.len() < MAX_EVENTS {
-                outlet.report(Event::Heard { severity, words });
+                outlet.report(connect::Event::Heard { severity, words });
             } else {
                 tracing::warn!(?severity, words, "the window is too busy to show what a driver says");
             }

@@ -3,5 +3,8 @@
 //! It is a sequence of poses that grows: after each capture and its answer the motion thread, which knows the arm, has the
 //! next pose chosen ([`handeye_plan::guided`]). Whatever ends a sequence ends it: STOP, another cell, another session.
 
+pub mod command;
 pub mod state;
 mod update;
+
+pub use command::{Command, Event};

@@ -12,10 +12,10 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_import::{self as import, ImportError, Plan, Recording, Settings, Source, write};
 use image::RgbImage;
 
+use super::Event;
 use super::state::{Converted, Found, ImportWork};
 use super::understand::{self, NotUnderstood};
 use crate::capture::thumbnail;
-use crate::command::Event;
 use crate::text::Text;
 use crate::worker::link::Outlet;
 use handeye_wording::text;
@@ -83,12 +83,12 @@ pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
         ImportTask::Convert { known, hypothesis, is_taken } => {
             let work = || convert(known, *hypothesis, *is_taken, number, outlet);
             let converted = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(defect(panic)));
-            Event::RecordingConverted { number, converted: converted.map(Arc::new) }
+            Event::Converted { number, converted: converted.map(Arc::new) }
         }
         ImportTask::ConvertImages { known } => {
             let work = || convert_images(known, number, outlet);
             let converted = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(defect(panic)));
-            Event::RecordingConverted { number, converted: converted.map(Arc::new) }
+            Event::Converted { number, converted: converted.map(Arc::new) }
         }
         ImportTask::Look { path, bounds, time, known, target, settings } => {
             let open = || {
@@ -100,13 +100,13 @@ pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
             let work = || look(open, known.as_deref(), *target, settings, number, cancel, outlet);
             let (found, trouble) =
                 catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| (None, Some(defect(panic))));
-            Event::RecordingLooked { number, found: found.map(Arc::new), trouble }
+            Event::Looked { number, found: found.map(Arc::new), trouble }
         }
         ImportTask::Judge { known, settings } => {
             let work = || judged(known, settings, cancel);
             let (found, trouble) =
                 catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| (None, Some(defect(panic))));
-            Event::RecordingLooked { number, found: found.map(Arc::new), trouble }
+            Event::Looked { number, found: found.map(Arc::new), trouble }
         }
     };
     if !cancel.is_cancelled() {
@@ -146,7 +146,7 @@ fn look(
         Ok(opened) => opened,
         Err(error) => return (None, Some(said(error.into()))),
     };
-    let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Looking(done, of) });
+    let progress = |done, of| outlet.report(Event::Progress { number, work: ImportWork::Looking(done, of) });
     let looked = understand::look(&opened, target, settings, &progress, cancel);
     let recording = looked.as_ref().map_or_else(|_| Arc::clone(&opened), |looked| Arc::clone(&looked.recording));
     // Of images of a moving robot only some are left.
@@ -218,7 +218,7 @@ fn convert_images(known: &Found, number: u64, outlet: &Outlet) -> Result<Convert
 fn written(plan: Plan, recording: &Recording, number: u64, outlet: &Outlet) -> Result<Converted, Text> {
     let folder = tempfile::tempdir()
         .map_err(|why| text!("There is no room for the data set on the way to a session: {why}", why = why))?;
-    let progress = |done, of| outlet.report(Event::ImportProgress { number, work: ImportWork::Writing(done, of) });
+    let progress = |done, of| outlet.report(Event::Progress { number, work: ImportWork::Writing(done, of) });
     write::write(&plan, folder.path(), progress)?;
     let name =
         recording.root.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy().into_owned());

@@ -1,4 +1,7 @@
 //! What the program says: log, toasts, the banner.
 
+pub mod command;
 pub(crate) mod state;
 pub(crate) mod update;
+
+pub use command::{Command, Event};

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::workflow::Pane;
+use crate::shell::state::Pane;
 use crate::text::{Language, Text};
 
 /// Messages that are kept: a long day of work, and not a leak.

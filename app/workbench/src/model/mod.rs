@@ -3,8 +3,6 @@
 //! Only [`crate::app::App::apply`] and [`crate::app::App::absorb`] change a [`Model`]; panes read it. Times are seconds
 //! on the clock that the application was started with.
 
-pub(crate) mod workflow;
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -38,6 +36,7 @@ pub use crate::recording::state::{RerunState, ViewerState};
 pub use crate::session::state::{
     FolderEntry, FolderKind, FolderListing, Observed, PoseSequence, RecentSession, Review, SessionState, StopOutcome,
 };
+pub use crate::shell::state::{Dialog, Pane, Step};
 pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
 pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
@@ -50,7 +49,6 @@ pub use handeye_link::{
     ArmDoubt, Axis, CellFacts, CellSource, Drivers, Jog, JogFrame, JointFacts, MotionGoal, MotionOutcome, Moves,
     RobotState, Simulation, Truth,
 };
-pub use workflow::{Dialog, Pane, Step};
 
 use crate::keep_out::state::KeepOut;
 use crate::motion::rest::Stopping;

@@ -7,9 +7,9 @@ use std::time::Instant;
 use handeye_coppeliasim::CancelToken;
 use handeye_plan::Surroundings;
 
+use super::command::Event;
 use super::grip::{Grip, SILENCE};
 use super::jog_line::{Held, JogLine};
-use crate::command::Event;
 use crate::connect::stop_line::StopLine;
 use crate::guided::state::GuideRequest;
 use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};

@@ -1,6 +1,7 @@
 //! Moving the arm: goals, jogging, and what refuses or ends a motion.
 
 pub(crate) mod ask;
+pub mod command;
 pub mod desk;
 pub mod grip;
 pub(crate) mod jog_line;
@@ -9,3 +10,5 @@ pub(crate) mod state;
 pub(crate) mod update;
 pub mod way;
 pub(crate) mod worker;
+
+pub use command::{Command, Event};

@@ -10,13 +10,13 @@ use handeye_plan::guided::choose::Robot;
 
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;
-use crate::command::Event;
 use crate::guided::state::{Choice, GuideRequest};
 use crate::model::{FollowStatus, FollowWish, Link, MotionId, MotionOutcome, Severity};
 use crate::text::Text;
 use crate::track::follow::follow;
 use crate::track::follow_line::FollowLine;
 use crate::worker::link::{Duty, Outlet};
+use crate::{guided, keep_out, motion, taught, track};
 use handeye_link::{Cell, Connected, JogRequest, MotionPort, PortError, ViewsRequest, end_of_following};
 use handeye_wording::text;
 
@@ -63,7 +63,7 @@ impl Motions {
                 (MotionOutcome::Failed(text!("The connection broke: {error}", error = error.why().clone())), Err(error))
             }
         };
-        outlet.report(Event::Moved { id: task.id(), outcome: reported });
+        outlet.report(motion::Event::Moved { id: task.id(), outcome: reported });
         ended
     }
 
@@ -80,7 +80,7 @@ impl Motions {
             Ok(views) => (views, Ok(())),
             Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };
-        outlet.report(Event::Planned { id, views });
+        outlet.report(taught::Event::Planned { id, views });
         ended
     }
 
@@ -97,7 +97,7 @@ impl Motions {
             Err(error) => (Err(text!("The connection broke: {error}", error = error.why().clone())), Err(error)),
         };
         self.desk.done();
-        outlet.report(Event::Guided { id, outcome });
+        outlet.report(guided::Event::Chosen { id, outcome });
         ended
     }
 
@@ -110,7 +110,7 @@ impl Motions {
         outlet: &Outlet,
     ) -> Result<MotionOutcome, PortError> {
         let mut makes_room = || {
-            outlet.report(Event::Follow(FollowStatus::MakingRoom));
+            outlet.report(track::Event::Follow(FollowStatus::MakingRoom));
             outlet.notice(
                 Severity::Info,
                 text!(
@@ -153,7 +153,7 @@ impl Motions {
     /// Before anything moves, and after what moves was taken: what was wished before it holds for it.
     fn keep_out(&self, port: &mut dyn MotionPort, outlet: &Outlet) {
         let Some(keep_out) = self.desk.take_keep_out() else { return };
-        outlet.report(Event::Standing(port.keep_out(&keep_out).map(Arc::new)));
+        outlet.report(keep_out::Event::Standing(port.keep_out(&keep_out).map(Arc::new)));
     }
 
     fn work(&self, port: &mut dyn MotionPort, outlet: &Outlet) -> Result<Duration, PortError> {

@@ -1,6 +1,7 @@
 //! What a recording is told: everything that happens, as [`Entry`]s. How they are kept and looked at is another crate's
 //! business, which implements [`Recording`].
 
+pub mod command;
 mod entry;
 pub(crate) mod recorded;
 pub(crate) mod state;
@@ -8,9 +9,8 @@ pub(crate) mod update;
 
 use std::time::Duration;
 
+pub use command::{Command, Event};
 pub use entry::Entry;
-
-use crate::command::Event;
 
 /// Where a browser that shows the window finds the recording: a path of the same server.
 pub const BROWSER_PATH: &str = "/rerun/";
@@ -24,7 +24,7 @@ pub trait Recording {
     fn open_viewer(&self);
 
     /// Hands over what is to be told since the last time.
-    fn drain(&self, absorb: &mut dyn FnMut(Event));
+    fn drain(&self, absorb: &mut dyn FnMut(crate::command::Event));
 
     /// Has everything written that was noted, waits for that no longer than so long, and ends. Returns whether all of it
     /// is where it belongs.

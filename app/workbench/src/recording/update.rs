@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use crate::app::App;
-use crate::command::{Event, SolveOutcome};
+use crate::command::Event;
 use crate::model::Dialog;
 use crate::recording::{Entry, Recording};
+use crate::solve::SolveOutcome;
 use crate::text::Language;
+use crate::{connect, live, session, solve, track};
 
 impl App {
     /// Has everything recorded from here on; without it nothing is.
@@ -31,29 +33,31 @@ impl App {
     pub(crate) fn record(&self, event: &Event) {
         let Some(recording) = &self.recording else { return };
         let entry = match event {
-            Event::Robot(robot) => Entry::Robot {
+            Event::Connect(connect::Event::Robot(robot)) => Entry::Robot {
                 sim_time_s: robot.sim_time_s,
                 base_from_tip: robot.base_from_tip,
                 joints_rad: robot.joints_rad,
             },
-            Event::Frame { info, images: Some(images), .. } => {
+            Event::Live(live::Event::Frame { info, images: Some(images), .. }) => {
                 Entry::Image { info: Box::new(info.clone()), images: Arc::clone(images) }
             }
-            Event::Detection(detection) => Entry::Detection(Arc::new((**detection).clone())),
-            Event::Cell(facts) => Entry::Cell(Arc::new((**facts).clone())),
-            Event::Document(state) => {
+            Event::Live(live::Event::Detection(detection)) => Entry::Detection(Arc::new((**detection).clone())),
+            Event::Connect(connect::Event::Cell(facts)) => Entry::Cell(Arc::new((**facts).clone())),
+            Event::Session(session::Event::Document(state)) => {
                 Entry::Document { folder: state.folder.clone(), document: Arc::clone(&state.document) }
             }
             // What was seen for another target is no longer of interest.
-            Event::Observed { id, target, observed: Some(observed) }
+            Event::Session(session::Event::Observed { id, target, observed: Some(observed) })
                 if *target == self.model.document().meta.target =>
             {
                 Entry::Observed { id: *id, observed: Arc::clone(observed) }
             }
-            Event::SolveEnded { job, outcome: SolveOutcome::Solved(solved) } if *job == self.numbers.job => {
+            Event::Solve(solve::Event::Ended { job, outcome: SolveOutcome::Solved(solved) })
+                if *job == self.numbers.job =>
+            {
                 Entry::Solved(Arc::clone(solved))
             }
-            Event::Tracked(tracked) => Entry::Tracked(Arc::clone(tracked)),
+            Event::Track(track::Event::Tracked(tracked)) => Entry::Tracked(Arc::clone(tracked)),
             _ => return,
         };
         recording.note(entry);

@@ -5,11 +5,13 @@
 
 mod arm;
 mod captures;
+pub mod command;
 mod extent;
 mod known;
 
 pub use arm::{PosedArm, posed_arm};
 pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};
+pub use command::Command;
 pub use extent::{AZIMUTH_RAD, ELEVATION_RAD, Extent, OPENING_RAD};
 pub use known::{Known, Truth};
 

@@ -9,9 +9,9 @@ use handeye_geometry::targets::TargetSpec;
 use handeye_session::{CaptureId, CaptureRecord};
 
 use crate::capture::thumbnail;
-use crate::command::Event;
 use crate::model::{Observed, Severity};
 use crate::observe;
+use crate::session;
 use crate::text::Text;
 use crate::worker::link::Outlet;
 use handeye_wording::text;
@@ -45,7 +45,7 @@ pub fn observe(job: &ObserveJob, cancel: &CancelToken, outlet: &Outlet) {
 }
 
 fn report(id: CaptureId, target: TargetSpec, observed: Option<Observed>, outlet: &Outlet) {
-    outlet.report(Event::Observed { id, target, observed: observed.map(Arc::new) });
+    outlet.report(session::Event::Observed { id, target, observed: observed.map(Arc::new) });
 }
 
 fn look(job: &ObserveJob, capture: &CaptureRecord, cancel: &CancelToken) -> Result<Observed, Text> {

@@ -11,8 +11,8 @@ use handeye_session::{CaptureId, Document, SessionObservations};
 
 use super::question::Question;
 use crate::app::App;
-use crate::command::SolveOutcome;
 use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, box_in_camera, judge_box};
+use crate::solve::SolveOutcome;
 use crate::text::Text;
 use crate::worker::{ArchiveTask, SolveJob};
 use handeye_wording::text;

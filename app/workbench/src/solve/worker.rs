@@ -15,8 +15,9 @@ use handeye_geometry::targets::observation::View;
 use handeye_result::{CalibrationResult, DepthSummary, VerificationSummary, solve_options};
 use handeye_session::CaptureId;
 
-use crate::command::{Event, SolveOutcome};
 use crate::model::{JobId, Solved, Truth};
+use crate::solve;
+use crate::solve::SolveOutcome;
 use crate::truth;
 use crate::worker::link::Outlet;
 use handeye_wording::text;
@@ -55,7 +56,7 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
         });
         if tell {
             told.set(Some(now));
-            outlet.report(Event::SolveProgress { job: id, stage: now.stage, part: now.fraction() });
+            outlet.report(solve::Event::Progress { job: id, stage: now.stage, part: now.fraction() });
         }
     };
     let work = Work { cancel, progress: &progress };
@@ -69,7 +70,7 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
             "The solver crashed on these captures. They are safe. Please report it with the session folder"
         )),
     };
-    outlet.report(Event::SolveEnded { job: id, outcome });
+    outlet.report(solve::Event::Ended { job: id, outcome });
 }
 
 /// The calibration of a job with all that is said about it: one path for the window and the command line.

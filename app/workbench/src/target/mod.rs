@@ -1,3 +1,6 @@
 //! The target, the camera and where it is mounted.
 
+pub mod command;
 pub(crate) mod print;
+
+pub use command::Command;

@@ -16,14 +16,13 @@ use handeye_result::CalibrationResult;
 use handeye_session::{CaptureRecord, Session};
 
 use super::link::Outlet;
-use crate::command::Event;
-use crate::keep_out;
 use crate::live::depth;
 use crate::model::{
     ColouredDepth, FolderEntry, FolderKind, FolderListing, FrameImages, PreviewFile, Severity, Written,
 };
 use crate::settings::SettingsWrite;
 use crate::text::Text;
+use crate::{export, keep_out, messages, session, taught};
 use handeye_wording::text;
 
 /// What can be asked for.
@@ -108,16 +107,16 @@ impl ExportJob {
 pub fn perform(task: FileTask, outlet: &Outlet) {
     match task {
         FileTask::Review { folder, capture, colours } => review(&folder, &capture, colours, outlet),
-        FileTask::List(folder) => outlet.report(Event::Folder(list(folder))),
+        FileTask::List(folder) => outlet.report(session::Event::Folder(list(folder))),
         FileTask::OpenFolder(folder) => open_folder(folder, |folder| open::that(folder), outlet),
-        FileTask::Preview(job) => outlet.report(Event::Previews(preview(&job))),
+        FileTask::Preview(job) => outlet.report(export::Event::Previews(preview(&job))),
         FileTask::Export { job, formats, folder } => {
             let files = write(&job, &formats, &folder);
-            outlet.report(Event::Exported(Written { folder, files }));
+            outlet.report(export::Event::Written(Written { folder, files }));
         }
         FileTask::Settings(settings) => {
             if let Err(warning) = settings.perform() {
-                outlet.report(warning.into());
+                outlet.report(messages::Event::from(warning));
             }
         }
         FileTask::PrintTarget { target, page, file } => {
@@ -126,7 +125,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
         }
         FileTask::ReadKeepOut(file) => {
             match KeepOutFile::read(&file).and_then(|content| content.surroundings(&file).map(|_around| content)) {
-                Ok(content) => outlet.report(Event::KeepOutRead(Box::new(content))),
+                Ok(content) => outlet.report(keep_out::Event::Read(Box::new(content))),
                 Err(error) => outlet.notice(Severity::Error, text!("The boxes were not read: {error}", error = error)),
             }
         }
@@ -141,7 +140,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
             }
         },
         FileTask::ReadPoses(file) => match TaughtPoses::read(&file) {
-            Ok(taught) => outlet.report(Event::PosesRead { poses: taught.poses }),
+            Ok(taught) => outlet.report(taught::Event::Read { poses: taught.poses }),
             Err(error) => outlet.notice(Severity::Error, text!("The poses were not read: {error}", error = error)),
         },
         FileTask::WritePoses { file, poses, prismatic } => {
@@ -158,7 +157,7 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
 
 fn review(folder: &Path, capture: &CaptureRecord, colours: ColourMap, outlet: &Outlet) {
     match images(folder, capture, colours) {
-        Ok(images) => outlet.report(Event::Review { id: capture.id, images: Some(Arc::new(images)) }),
+        Ok(images) => outlet.report(session::Event::Review { id: capture.id, images: Some(Arc::new(images)) }),
         Err(why) => {
             let text = text!("Capture {id} cannot be read: {why}", id = capture.id, why = why);
             outlet.notice(Severity::Error, text);
@@ -255,6 +254,7 @@ fn write(job: &ExportJob, formats: &[String], folder: &Path) -> Result<Vec<PathB
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::Event;
     use crate::text::Language;
 
     /// What is said until nobody is left who could say something.
@@ -265,7 +265,7 @@ mod tests {
         open_folder(folder.to_path_buf(), show, &outlet);
         drop(outlet);
         let notices = reported.iter().map(|event| match event {
-            Event::Notice { text, .. } => text.say(Language::English),
+            Event::Messages(messages::Event::Notice { text, .. }) => text.say(Language::English),
             other => panic!("{other:?}"),
         });
         notices.collect()

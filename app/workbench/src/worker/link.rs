@@ -10,6 +10,7 @@ use super::{Clock, Waker};
 use crate::command::Event;
 use crate::model::{Link, Severity};
 use crate::text::Text;
+use crate::{connect, messages};
 use handeye_link::{Cell, Connected, PortError};
 
 /// What a worker is asked for.
@@ -36,7 +37,8 @@ pub struct Outlet {
 
 impl Outlet {
     /// Reports an event.
-    pub fn report(&self, event: Event) {
+    pub fn report(&self, event: impl Into<Event>) {
+        let event = event.into();
         if self.events.send(event).is_err() {
             tracing::debug!("the window has gone");
         }
@@ -45,7 +47,7 @@ impl Outlet {
 
     /// Tells the user something.
     pub fn notice(&self, severity: Severity, text: Text) {
-        self.report(Event::Notice { severity, text });
+        self.report(messages::Event::Notice { severity, text });
     }
 
     /// The present time \[s\].
@@ -126,7 +128,7 @@ impl<D: Duty> LinkLoop<'_, D> {
 
     fn report(&self, state: crate::model::LinkState) {
         tracing::debug!(link = ?D::LINK, ?state, "link");
-        self.outlet.report(Event::Link { link: D::LINK, state });
+        self.outlet.report(connect::Event::Link { link: D::LINK, state });
     }
 
     /// Works over one connection until it breaks.

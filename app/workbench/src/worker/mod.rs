@@ -66,6 +66,7 @@ use crate::model::{
     CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
 };
 use crate::motion::worker::Motions;
+use crate::{connect, live, track};
 use link::{Duty, LinkLoop, Outlet};
 use reconnect::Reconnect;
 use slot::Tap;
@@ -199,21 +200,21 @@ impl Workers {
         for events in self.events.iter().flatten() {
             events.try_iter().take(MAX_EVENTS).for_each(&mut absorb);
         }
-        self.desk.take_said().into_iter().for_each(&mut absorb);
+        self.desk.take_said().into_iter().map(Event::from).for_each(&mut absorb);
         if let Some((robot, _)) = self.robot.take() {
-            absorb(robot.map_or(Event::NoRobot, Event::Robot));
+            absorb(robot.map_or(connect::Event::NoRobot, connect::Event::Robot).into());
         }
         if let Some((LiveFrame { info, images }, dropped)) = self.frames.take() {
-            absorb(Event::Frame { info, dropped, images: Some(images) });
+            absorb(live::Event::Frame { info, dropped, images: Some(images) }.into());
         }
         if let Some((detection, _)) = self.detections.take() {
-            absorb(Event::Detection(Box::new(detection)));
+            absorb(live::Event::Detection(Box::new(detection)).into());
         }
         if let Some((tracked, _)) = self.tracked.take() {
-            absorb(Event::Tracked(Arc::new(tracked)));
+            absorb(track::Event::Tracked(Arc::new(tracked)).into());
         }
         if let Some(status) = self.follow.take_status() {
-            absorb(Event::Follow(status));
+            absorb(track::Event::Follow(status).into());
         }
     }
 
@@ -234,8 +235,8 @@ impl Workers {
         self.desk.keep_out(keep_out);
     }
 
-    /// Asks for a motion. However it ends, [`Event::Moved`] tells once, also when it is refused because something moves
-    /// already.
+    /// Asks for a motion. However it ends, [`Moved`](crate::motion::Event::Moved) tells once, also when it is refused
+    /// because something moves already.
     ///
     /// # Errors
     /// [`Busy`] when the program ends; then nothing is reported.
@@ -269,8 +270,8 @@ impl Workers {
         self.begin(MotionTask::Follow { id, wish, speed })
     }
 
-    /// Asks for poses to look at the board from. [`Event::Planned`] tells them; [`Event::Moved`], with the same number, why
-    /// they are not looked for.
+    /// Asks for poses to look at the board from. [`Planned`](crate::taught::Event::Planned) tells them;
+    /// [`Moved`](crate::motion::Event::Moved), with the same number, why they are not looked for.
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -278,8 +279,8 @@ impl Workers {
         self.begin(MotionTask::Plan { id, request: Box::new(request) })
     }
 
-    /// Asks for the next pose of a guided sequence. [`Event::Guided`] tells it; [`Event::Moved`], with the same number, why
-    /// it is not chosen.
+    /// Asks for the next pose of a guided sequence. [`Chosen`](crate::guided::Event::Chosen) tells it;
+    /// [`Moved`](crate::motion::Event::Moved), with the same number, why it is not chosen.
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -293,8 +294,8 @@ impl Workers {
     }
 
     /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
-    /// stops by itself after [`HELD_S`]. [`Event::JogEnded`] tells that the arm stands: when the jog ends, and once more when
-    /// a button is let go that had been held for longer.
+    /// stops by itself after [`HELD_S`]. [`JogEnded`](crate::motion::Event::JogEnded) tells that the arm stands: when the
+    /// jog ends, and once more when a button is let go that had been held for longer.
     pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
         let request = JogRequest { jog, tip_from_camera, speed };
         if self.desk.hold(request, &self.stop, self.now_s()) {

@@ -11,6 +11,7 @@ use super::*;
 use crate::model::{CellFacts, FollowStatus, FollowWish, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::testing::sample;
 use crate::text::{Language, Text};
+use crate::{connect, messages, motion, taught, track};
 
 /// A healthy worker answers within milliseconds; this is for a machine that does something else.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -72,33 +73,39 @@ impl Bench {
 
     pub fn until_link(&mut self, link: Link, wanted: impl Fn(&LinkState) -> bool) -> LinkState {
         self.until("a state of a connection", |event| match event {
-            Event::Link { link: which, state } if *which == link && wanted(state) => Some(state.clone()),
+            Event::Connect(connect::Event::Link { link: which, state }) if *which == link && wanted(state) => {
+                Some(state.clone())
+            }
             _ => None,
         })
     }
 
     pub fn moved(&mut self, id: u64) -> MotionOutcome {
         self.until("the end of a motion", |event| match event {
-            Event::Moved { id: which, outcome } if *which == MotionId(id) => Some(outcome.clone()),
+            Event::Motion(motion::Event::Moved { id: which, outcome }) if *which == MotionId(id) => {
+                Some(outcome.clone())
+            }
             _ => None,
         })
     }
 
     pub fn jog_ended(&mut self) -> Option<String> {
         self.until("the end of a jog", |event| match event {
-            Event::JogEnded { why } => Some(why.as_ref().map(|why| why.say(Language::English))),
+            Event::Motion(motion::Event::JogEnded { why }) => Some(why.as_ref().map(|why| why.say(Language::English))),
             _ => None,
         })
     }
 
     pub fn stopped(&mut self) {
-        self.until("the confirmation of a stop", |event| matches!(event, Event::Stopped).then_some(()));
+        self.until("the confirmation of a stop", |event| {
+            matches!(event, Event::Motion(motion::Event::Stopped)).then_some(())
+        });
     }
 
     pub fn facts(&mut self) -> CellFacts {
         self.next = 0;
         self.until("what is known of the cell", |event| match event {
-            Event::Cell(facts) => Some(facts.as_ref().clone()),
+            Event::Connect(connect::Event::Cell(facts)) => Some(facts.as_ref().clone()),
             _ => None,
         })
     }
@@ -111,7 +118,7 @@ impl Bench {
     pub fn ends(&mut self) -> usize {
         let Self { workers, events, .. } = self;
         workers.drain(|event| events.push(event));
-        self.events.iter().filter(|event| matches!(event, Event::Moved { .. })).count()
+        self.events.iter().filter(|event| matches!(event, Event::Motion(motion::Event::Moved { .. }))).count()
     }
 }
 
@@ -319,7 +326,8 @@ fn another_button_takes_over_without_a_word_in_between() {
     begun(&cell, 2);
     bench.workers.release_jog();
     assert_eq!(bench.jog_ended(), None);
-    let ends = bench.events.iter().filter(|event| matches!(event, Event::JogEnded { .. })).count();
+    let ends =
+        bench.events.iter().filter(|event| matches!(event, Event::Motion(motion::Event::JogEnded { .. }))).count();
     assert_eq!(ends, 1);
 }
 
@@ -366,9 +374,11 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
     bench.moved(2);
     assert!(cell.script().moved.is_empty(), "it was not wished");
     follow(&bench, 3, FollowWish::KeepViewWithRoom);
-    bench.until("word of the move", |event| matches!(event, Event::Follow(FollowStatus::MakingRoom)).then_some(()));
+    bench.until("word of the move", |event| {
+        matches!(event, Event::Track(track::Event::Follow(FollowStatus::MakingRoom))).then_some(())
+    });
     let said = bench.until("what it does", |event| match event {
-        Event::Notice { text, .. } => Some(text.say(Language::English)),
+        Event::Messages(messages::Event::Notice { text, .. }) => Some(text.say(Language::English)),
         _ => None,
     });
     assert!(said.contains("no room to follow the board"), "{said}");
@@ -403,7 +413,7 @@ fn poses_are_planned_without_a_motion_and_the_arm_is_free_afterwards() {
     cell.script().views = Ok(views.clone());
     bench.workers.plan_views(MotionId(1), request).expect("the worker is there");
     let planned = bench.until("the poses", |event| match event {
-        Event::Planned { id: MotionId(1), views } => Some(views.clone()),
+        Event::Taught(taught::Event::Planned { id: MotionId(1), views }) => Some(views.clone()),
         _ => None,
     });
     assert_eq!(planned, Ok(views));

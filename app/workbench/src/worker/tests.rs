@@ -7,6 +7,7 @@ use super::fake::FakeCell;
 use super::*;
 use crate::model::{Link, LinkState, Severity, Simulation};
 use crate::text::Text;
+use crate::{connect, live, messages, motion};
 
 /// A healthy worker answers within milliseconds; this is for a machine that does something else.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -54,11 +55,12 @@ impl Bench {
     }
 
     fn until_link(&mut self, link: Link, what: &str, wanted: impl Fn(&LinkState) -> bool) {
-        self.until(
-            what,
-            |event| matches!(event, Event::Link { link: which, state } if *which == link && wanted(state)),
-        );
+        self.until(what, |event| is(event, link, &wanted));
     }
+}
+
+fn runs(event: &Event) -> bool {
+    matches!(event, Event::Connect(connect::Event::Robot(robot)) if robot.simulation == Simulation::Running)
 }
 
 #[test]
@@ -66,15 +68,15 @@ fn both_connections_are_made_and_images_and_robot_arrive() {
     let cell = FakeCell::new(u64::MAX);
     let mut bench = Bench::built_in(&cell);
     bench.until_link(Link::Control, "control", LinkState::is_connected);
-    let Event::Frame { info, images: Some(images), .. } =
-        bench.until("an image", |event| matches!(event, Event::Frame { .. }))
+    let Event::Live(live::Event::Frame { info, images: Some(images), .. }) =
+        bench.until("an image", |event| matches!(event, Event::Live(live::Event::Frame { .. })))
     else {
         panic!("not an image")
     };
     assert_eq!(info.received_s, 7.0);
     assert_eq!(images.depth.as_ref().expect("it measures depth").colours.dimensions(), images.rgb.dimensions());
     assert!(info.depth_range_m[0] <= 0.4 && info.depth_range_m[1] >= 0.79, "{:?}", info.depth_range_m);
-    bench.until("the robot", |event| matches!(event, Event::Robot(_)));
+    bench.until("the robot", |event| matches!(event, Event::Connect(connect::Event::Robot(_))));
 }
 
 #[test]
@@ -140,7 +142,7 @@ fn the_newest_image_wins_and_the_others_are_counted() {
     }
     let mut frames = Vec::new();
     workers.drain(|event| {
-        if let Event::Frame { info, dropped, images } = event {
+        if let Event::Live(live::Event::Frame { info, dropped, images }) = event {
             frames.push((info.number, dropped, images));
         }
     });
@@ -154,11 +156,17 @@ fn the_newest_image_wins_and_the_others_are_counted() {
 fn images_of_an_instant_that_was_seen_are_not_fetched_again() {
     let cell = FakeCell::new(2);
     let mut bench = Bench::built_in(&cell);
-    bench.until("the second image", |event| matches!(event, Event::Frame { info, .. } if info.number == 2));
+    bench.until(
+        "the second image",
+        |event| matches!(event, Event::Live(live::Event::Frame { info, .. }) if info.number == 2),
+    );
     for _ in 0..5 {
-        bench.until("the robot", |event| matches!(event, Event::Robot(_)));
+        bench.until("the robot", |event| matches!(event, Event::Connect(connect::Event::Robot(_))));
     }
-    let more = bench.events.iter().filter(|event| matches!(event, Event::Frame { info, .. } if info.number > 2));
+    let more = bench
+        .events
+        .iter()
+        .filter(|event| matches!(event, Event::Live(live::Event::Frame { info, .. }) if info.number > 2));
     assert_eq!(more.count(), 0);
 }
 
@@ -168,7 +176,7 @@ fn a_stop_reaches_the_arm() {
     let mut bench = Bench::built_in(&cell);
     bench.until_link(Link::Control, "control", LinkState::is_connected);
     bench.workers.press_stop();
-    bench.until("the confirmation", |event| matches!(event, Event::Stopped));
+    bench.until("the confirmation", |event| matches!(event, Event::Motion(motion::Event::Stopped)));
     assert_eq!(cell.script().stops, 1);
 }
 
@@ -178,7 +186,7 @@ fn a_stop_pressed_while_the_connection_is_down_is_carried_out_when_it_is_back() 
     cell.script().refusals = vec![PortError::Lost(Text::verbatim("nothing answers")); 6];
     let mut bench = Bench::built_in(&cell);
     bench.workers.press_stop();
-    bench.until("the confirmation", |event| matches!(event, Event::Stopped));
+    bench.until("the confirmation", |event| matches!(event, Event::Motion(motion::Event::Stopped)));
 }
 
 #[test]
@@ -187,12 +195,12 @@ fn a_stop_that_fails_is_told_and_tried_again() {
     cell.script().refuse_tasks = Some(PortError::Lost(Text::verbatim("the cable is out")));
     let mut bench = Bench::built_in(&cell);
     bench.workers.press_stop();
-    bench.until(
-        "the failure",
-        |event| matches!(event, Event::Notice { severity: Severity::Error, text } if text.say(crate::text::Language::English).contains("may still move")),
-    );
+    bench.until("the failure", |event| {
+        matches!(event, Event::Messages(messages::Event::Notice { severity: Severity::Error, text })
+                if text.say(crate::text::Language::English).contains("may still move"))
+    });
     cell.script().refuse_tasks = None;
-    bench.until("the confirmation", |event| matches!(event, Event::Stopped));
+    bench.until("the confirmation", |event| matches!(event, Event::Motion(motion::Event::Stopped)));
 }
 
 #[test]
@@ -200,16 +208,16 @@ fn the_simulation_of_the_built_in_cell_is_started_and_that_of_somebody_else_is_n
     let cell = FakeCell::new(1);
     cell.script().simulation = Simulation::Stopped;
     let mut bench = Bench::built_in(&cell);
-    bench.until("it runs", |event| matches!(event, Event::Robot(robot) if robot.simulation == Simulation::Running));
+    bench.until("it runs", runs);
 
     cell.script().simulation = Simulation::Stopped;
     let mut bench = Bench::start(&CellSource::Address("tcp://fake:1".to_owned()), &cell);
     for _ in 0..3 {
-        bench.until("the robot", |event| matches!(event, Event::Robot(_)));
+        bench.until("the robot", |event| matches!(event, Event::Connect(connect::Event::Robot(_))));
     }
     assert_eq!(cell.script().simulation, Simulation::Stopped);
     bench.workers.ask_control(Request::Do(ControlTask::StartSimulation)).expect("it takes requests");
-    bench.until("it runs", |event| matches!(event, Event::Robot(robot) if robot.simulation == Simulation::Running));
+    bench.until("it runs", runs);
 }
 
 #[test]
@@ -267,7 +275,7 @@ fn wakes(wake: crossbeam_channel::Sender<()>) -> Waker {
 }
 
 fn is(event: &Event, link: Link, wanted: impl Fn(&LinkState) -> bool) -> bool {
-    matches!(event, Event::Link { link: which, state } if *which == link && wanted(state))
+    matches!(event, Event::Connect(connect::Event::Link { link: which, state }) if *which == link && wanted(state))
 }
 
 impl Bench {

@@ -13,10 +13,10 @@ use handeye_plan::guided::CHECKS;
 use handeye_server::{CellConfig, CellServer};
 use handeye_tests::handeye_binary;
 use handeye_tests::workbench::Workbench;
-use handeye_workbench::command::Command;
 use handeye_workbench::model::{
     CapturePurpose, CellSource, Drivers, JogSettings, LinkState, Model, Motion, SolveStatus,
 };
+use handeye_workbench::{capture, connect, export, guided, motion, taught};
 
 /// A cell that keeps pace with real time, as drivers of hardware do.
 fn cell() -> (CellServer, Endpoint) {
@@ -76,14 +76,14 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.until("the robot", |model| model.robot.is_some());
 
     assert!(bench.model().taught().is_empty(), "nobody has taught this arm anything");
-    bench.click(Command::ImportTaught(reference_poses()));
+    bench.click(taught::Command::Import(reference_poses()));
     bench.until("the poses", |model| model.taught().len() == 10);
-    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.click(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("the refusal", |model| !model.sequence_runs);
     assert!(bench.said().contains("only read"), "nothing moves before somebody allows it: {}", bench.said());
-    bench.click(Command::Arm(true));
+    bench.click(connect::Command::Arm(true));
     bench.until("the permission", Model::is_armed);
-    bench.allow(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("five captures", |model| model.document().captures.len() >= 5);
 
     // Its process alone: the camera's goes on.
@@ -94,11 +94,11 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.until("the robot again, which is only read", |model| {
         is_connected(model) && model.mover.is_connected() && model.robot.is_some() && !model.is_armed()
     });
-    bench.click(Command::Arm(true));
+    bench.click(connect::Command::Arm(true));
     bench.until("the permission", Model::is_armed);
-    bench.click(Command::ContinueSequence);
+    bench.click(taught::Command::ContinueSequence);
     // The arm may stand there.
-    bench.click(Command::ConfirmMove);
+    bench.click(motion::Command::ConfirmMove);
     bench.until("the rest of the sequence", |model| !model.sequence_runs && model.motion == Motion::Idle);
     bench.until("a solution", is_solved);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
@@ -106,7 +106,7 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     let mm = error_mm(&bench, &truth);
     assert!(mm < 0.5, "{mm} mm: a clock off by 80 ms, or an image of another pose, would show here");
 
-    bench.click(Command::Export);
+    bench.click(export::Command::Export);
     bench.until("the exports", |model| model.export.written.is_some());
 }
 
@@ -121,16 +121,16 @@ fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever
         bench.until("a chain that fits", |model| model.cell.as_ref().is_some_and(|cell| cell.arm.is_some()));
         bench.until("the board", |model| model.board_seen_s.is_some());
         assert_eq!(bench.model().cell.as_ref().expect("a cell").joints.len(), joints);
-        bench.click(Command::Arm(true));
+        bench.click(connect::Command::Arm(true));
         bench.until("the permission", Model::is_armed);
-        bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
+        bench.click(motion::Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
         assert!(bench.model().confirms_moves(), "a real arm goes step by step");
-        bench.click(Command::CalibrateForMe);
+        bench.click(guided::Command::CalibrateForMe);
         let waits = |model: &Model| model.asked.is_some();
         bench.until("the first move that waits", |model| waits(model) && model.document().captures.len() == 1);
-        bench.click(Command::ConfirmMove);
+        bench.click(motion::Command::ConfirmMove);
         bench.until("the second", |model| waits(model) && model.document().captures.len() == 2);
-        bench.click(Command::SetConfirmMoves(false));
+        bench.click(motion::Command::SetConfirmMoves(false));
         bench.until("the end", |model| !model.sequence_runs && model.capture.is_none());
         bench.until("a solution", is_solved);
         let model = bench.model();
@@ -157,9 +157,9 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
         let limits = limits::of_tip(&limits::SEQUENCE, 1.0);
         hand.move_to_pose(goal, &limits, &MotionTolerance::default(), &cancel).expect("it is moved");
         hand.settle(&SettleOptions::default(), &cancel).expect("it stands");
-        bench.click(Command::TypePose(hand.base_from_tip().expect("the pendant shows it")));
+        bench.click(connect::Command::TypePose(hand.base_from_tip().expect("the pendant shows it")));
         bench.until("the typed pose", |model| model.robot.is_some());
-        bench.click(Command::Capture(CapturePurpose::Calibrate));
+        bench.click(capture::Command::Take(CapturePurpose::Calibrate));
         bench.until("the capture", |model| model.document().captures.len() == number + 1);
         bench.until("the question for the next pose", |model| model.robot.is_none());
     }
@@ -169,7 +169,7 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
     assert!(mm < 0.5, "{mm} mm");
 
     // The pose of the last capture is not that of the next one.
-    bench.click(Command::Capture(CapturePurpose::Calibrate));
+    bench.click(capture::Command::Take(CapturePurpose::Calibrate));
     bench.until("the refusal", |model| model.refused.is_some());
     assert!(bench.said().contains("type the pose that its pendant shows"), "{}", bench.said());
 }
@@ -191,9 +191,9 @@ fn a_driver_that_ends_at_once_is_tried_a_few_times_says_why_and_then_waits_for_a
     let tried = starts();
     assert!((3..20).contains(&tried), "{tried} starts by three threads");
 
-    bench.click(Command::Reconnect);
+    bench.click(connect::Command::Reconnect);
     bench.until("another try", |model| matches!(model.control, LinkState::Searching { .. }) && starts() > tried);
-    bench.click(Command::StopTrying);
+    bench.click(connect::Command::StopTrying);
     bench.until("the rest", |model| {
         [&model.control, &model.camera, &model.mover].iter().all(|link| matches!(link, LinkState::Resting { .. }))
     });

@@ -11,8 +11,8 @@ use handeye_session::CaptureId;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, workspace_root};
 use handeye_track::State;
-use handeye_workbench::command::Command;
 use handeye_workbench::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
+use handeye_workbench::{connect, motion, track};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -97,14 +97,14 @@ fn tracking_at(folder: &std::path::Path, file: &str, config: CellConfig, first: 
         let connected = model.control.is_connected() && model.camera.is_connected() && model.mover.is_connected();
         connected && model.frame.is_some() && model.cell.is_some() && model.robot.is_some()
     });
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("a solution", |model| model.solve.current().is_some());
-    bench.click(Command::GoToCapture(first));
+    bench.click(motion::Command::GoToCapture(first));
     // The arm may be there already.
-    bench.click(Command::ConfirmMove);
+    bench.click(motion::Command::ConfirmMove);
     bench.until("the arm at the first pose", |model| model.motion == handeye_workbench::model::Motion::Idle);
-    bench.click(Command::SetTracking(true));
+    bench.click(track::Command::SetTracking(true));
     bench.until("the board", is_tracked);
     (bench, cell)
 }
@@ -159,16 +159,16 @@ fn the_view_is_kept_while_the_board_moves_and_exactly_once_it_stands() {
     let (mut bench, mut cell) = tracking(folder.path());
     let newest = bench.model().track.newest.clone().expect("tracked");
     let kept = newest.update.seen.as_ref().expect("seen").camera_from_target;
-    bench.click(Command::SetFollow(Some(FollowWish::KeepPose(kept))));
+    bench.click(track::Command::SetFollow(Some(FollowWish::KeepPose(kept))));
     bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
     cell.paced(true);
-    bench.click(Command::MoveBoard(BoardMotion { path: BoardPath::Circle, speed_m_s: SPEED_M_S }));
+    bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Circle, speed_m_s: SPEED_M_S }));
     cell.passes(&mut bench, 2.0);
     let [metres, radians] = deviation(&mut bench, &mut cell, &kept, 10.0);
     println!("board at {SPEED_M_S} m/s: {:.2} mm, {:.3}° RMS", metres * 1e3, radians.to_degrees());
     assert!(metres <= 10e-3 && radians.to_degrees() <= 1.0, "{metres} m, {radians} rad");
 
-    bench.click(Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: SPEED_M_S }));
+    bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: SPEED_M_S }));
     cell.passes(&mut bench, 3.0);
     let [metres, radians] = deviation(&mut bench, &mut cell, &kept, 2.0);
     println!("board at rest: {:.2} mm, {:.3}° RMS", metres * 1e3, radians.to_degrees());
@@ -176,7 +176,7 @@ fn the_view_is_kept_while_the_board_moves_and_exactly_once_it_stands() {
 
     cell.paced(false);
     // Nothing but the stop is pressed; it ends the following as it ends everything.
-    bench.click(Command::Stop);
+    bench.click(motion::Command::Stop);
     bench.until("the arm at rest", |model| !model.stop_pending && matches!(model.track.follow, FollowStatus::Ended(_)));
 }
 
@@ -190,7 +190,7 @@ fn the_view_is_kept_with_nothing_but_what_coppeliasim_has() {
     let (mut bench, mut cell) = tracking_at(folder.path(), "assets/scenes/realistic.toml", config, FIRST);
     cell.paced(true);
     let kept = seen_view(bench.model());
-    bench.click(Command::SetFollow(Some(FollowWish::KeepPose(kept))));
+    bench.click(track::Command::SetFollow(Some(FollowWish::KeepPose(kept))));
     while !matches!(bench.model().track.follow, FollowStatus::Following { .. }) {
         assert!(!matches!(bench.model().track.follow, FollowStatus::Ended(_)), "{}", bench.said());
         cell.pass(&mut bench);
@@ -200,7 +200,7 @@ fn the_view_is_kept_with_nothing_but_what_coppeliasim_has() {
     println!("board at {SPEED_M_S} m/s: {:.2} mm, {:.3}° RMS", metres * 1e3, radians.to_degrees());
     assert!(metres <= 10e-3 && radians.to_degrees() <= 1.0, "{metres} m, {radians} rad");
     cell.paced(false);
-    bench.click(Command::Stop);
+    bench.click(motion::Command::Stop);
     bench.until("the arm at rest", |model| !model.stop_pending && matches!(model.track.follow, FollowStatus::Ended(_)));
 }
 
@@ -215,19 +215,19 @@ fn after_the_ten_poses_one_click_follows_the_board_along_every_path_for_minutes(
     let scene = Scene::reference().expect("the scene");
     let (mut bench, mut cell) =
         tracking_at(folder.path(), "assets/scenes/reference.toml", CellConfig::new(scene), LAST);
-    bench.click(Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    bench.click(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
     bench.until("the move to where there is room", |model| model.track.follow == FollowStatus::MakingRoom);
     bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
     for path in [BoardPath::Circle, BoardPath::FigureEight, BoardPath::RandomWalk, BoardPath::Step] {
         let kept = true_view(bench.model());
         cell.paced(true);
-        bench.click(Command::MoveBoard(BoardMotion { path, speed_m_s: SPEED_M_S }));
+        bench.click(track::Command::MoveBoard(BoardMotion { path, speed_m_s: SPEED_M_S }));
         let [metres, radians] = deviation(&mut bench, &mut cell, &kept, seconds);
         println!("{path}: {:.2} mm, {:.3}° RMS in {seconds} s", metres * 1e3, radians.to_degrees());
         // A board that jumps every two seconds is 80 mm away at first, and caught up with in less than one.
         let most_m = if path == BoardPath::Step { 60e-3 } else { 10e-3 };
         assert!(metres <= most_m, "{path}: {metres} m");
-        bench.click(Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: SPEED_M_S }));
+        bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: SPEED_M_S }));
         cell.passes(&mut bench, 4.0);
         cell.paced(false);
         assert!(matches!(bench.model().track.follow, FollowStatus::Following { .. }), "{path}: {}", bench.said());
@@ -244,12 +244,12 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
     let paths = [BoardPath::Circle, BoardPath::FigureEight, BoardPath::RandomWalk, BoardPath::Step];
     for trial in 0..trials {
         let path = paths[rng.random_range(0..paths.len())];
-        bench.click(Command::SetFollow(Some(FollowWish::KeepView)));
+        bench.click(track::Command::SetFollow(Some(FollowWish::KeepView)));
         bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
         cell.paced(true);
-        bench.click(Command::MoveBoard(BoardMotion { path, speed_m_s: 0.1 }));
+        bench.click(track::Command::MoveBoard(BoardMotion { path, speed_m_s: 0.1 }));
         cell.passes(&mut bench, rng.random_range(0.3..2.5));
-        bench.click(Command::HideBoard(true));
+        bench.click(track::Command::HideBoard(true));
         let hidden_s = sim_time_s(bench.model());
         let mut fastest_rad_s: f64 = 0.0;
         let mut before = bench.model().frame.clone().expect("an image").info;
@@ -268,7 +268,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
             before = now;
         }
         // The arm waits for a while before it gives up; until then the board would go out of the image of the first pose.
-        bench.click(Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: 0.1 }));
+        bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: 0.1 }));
         cell.paced(false);
         bench.until("the end of following", |model| matches!(model.track.follow, FollowStatus::Ended(_)));
         assert!(fastest_rad_s <= limits.joint_speed_rad_s * 1.001, "trial {trial}: {fastest_rad_s} rad/s");
@@ -276,9 +276,9 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
             limits.workspace.contains(&before.base_from_tip.expect("a cell reports it").translation()),
             "trial {trial}: outside its box"
         );
-        bench.click(Command::HideBoard(false));
-        bench.click(Command::GoToCapture(FIRST));
-        bench.click(Command::ConfirmMove);
+        bench.click(track::Command::HideBoard(false));
+        bench.click(motion::Command::GoToCapture(FIRST));
+        bench.click(motion::Command::ConfirmMove);
         bench.until("the arm at the first pose", |model| model.motion == handeye_workbench::model::Motion::Idle);
         bench.until("the board", is_tracked);
     }

@@ -13,10 +13,10 @@ use handeye_server::{CellConfig, CellServer};
 use handeye_session::Role;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry, workspace_root};
-use handeye_workbench::command::Command;
 use handeye_workbench::guided::state::GuidedProgress;
 use handeye_workbench::model::{CellSource, JogSettings, Model, Motion, MotionGoal};
 use handeye_workbench::text::Text;
+use handeye_workbench::{by_hand, connect, guided, motion, taught};
 use nalgebra::Point3;
 
 fn auto(folder: &Path, arguments: &[&str]) -> Output {
@@ -87,12 +87,12 @@ fn connected(folder: &Path) -> (Workbench, CellServer) {
         let connected = model.control.is_connected() && model.camera.is_connected() && model.mover.is_connected();
         connected && model.frame.is_some() && model.cell.is_some() && model.robot.is_some()
     });
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("the board", |model| model.board_seen_s.is_some());
-    bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
+    bench.click(motion::Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
     // Behind an address there may be a real arm, and each move waits for a person; the first one always does.
-    bench.click(Command::SetConfirmMoves(false));
+    bench.click(motion::Command::SetConfirmMoves(false));
     (bench, cell)
 }
 
@@ -104,7 +104,7 @@ fn count(model: &Model, role: Role) -> usize {
 fn one_click_leads_from_the_board_in_view_to_a_checked_answer_below_the_goal() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.allow(Command::CalibrateForMe);
+    bench.allow(guided::Command::CalibrateForMe);
     bench.until("a choice", |model| {
         model.sequence.as_ref().and_then(|it| it.guided.as_ref()).is_some_and(|guided| guided.why.is_some())
     });
@@ -123,9 +123,9 @@ fn one_click_leads_from_the_board_in_view_to_a_checked_answer_below_the_goal() {
 fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.allow(Command::CalibrateForMe);
+    bench.allow(guided::Command::CalibrateForMe);
     bench.until("two captures", |model| count(model, Role::Calibration) >= 2);
-    bench.click(Command::Stop);
+    bench.click(motion::Command::Stop);
     bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending && model.motion == Motion::Idle);
     let kept = count(bench.model(), Role::Calibration);
     let sim_time = |model: &Model| model.robot.as_ref().map_or(0.0, |robot| robot.sim_time_s);
@@ -133,7 +133,7 @@ fn a_stop_ends_it_at_once_and_it_goes_on_from_there_when_wished() {
     bench.until("two seconds", |model| sim_time(model) > stopped_s + 2.0);
     assert_eq!(count(bench.model(), Role::Calibration), kept, "nothing goes on by itself");
     // Captures that there are count.
-    bench.allow(Command::ContinueSequence);
+    bench.allow(taught::Command::ContinueSequence);
     bench.until("the end", |model| !model.sequence_runs && count(model, Role::Verification) == 3);
     assert!(count(bench.model(), Role::Calibration) <= kept + 16);
 }
@@ -146,12 +146,12 @@ fn guided(model: &Model) -> Option<&GuidedProgress> {
 fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.click(Command::SetConfirmMoves(true));
-    bench.click(Command::CalibrateForMe);
+    bench.click(motion::Command::SetConfirmMoves(true));
+    bench.click(guided::Command::CalibrateForMe);
     let waits = |model: &Model| guided(model).is_some() && model.asked.is_some();
     bench.until("a pose that waits", waits);
     let first = guided(bench.model()).expect("it runs").ahead[0].base_from_tip;
-    bench.click(Command::SkipMove);
+    bench.click(motion::Command::SkipMove);
     bench.until("another one", |model| {
         waits(model) && guided(model).is_some_and(|it| it.ahead[0].base_from_tip != first)
     });
@@ -159,11 +159,11 @@ fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session
         let before = bench.model().robot.as_ref().expect("connected").joints_rad;
         bench.until("a pose that waits", waits);
         assert_eq!(bench.model().robot.as_ref().expect("connected").joints_rad, before, "it moved by itself");
-        bench.click(Command::ConfirmMove);
+        bench.click(motion::Command::ConfirmMove);
         bench.until("a capture", |model| count(model, Role::Calibration) == captures);
     }
     bench.until("a pose that waits", waits);
-    bench.click(Command::Stop);
+    bench.click(motion::Command::Stop);
     bench.until("the end", |model| !model.sequence_runs);
     let session = bench.model().session.folder.clone().expect("a session");
     // It is written beside the window.
@@ -182,7 +182,7 @@ fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session
 fn a_person_who_brings_about_the_views_that_are_asked_for_gets_a_checked_answer() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = connected(folder.path());
-    bench.click(Command::GuideByHand);
+    bench.click(by_hand::Command::Guide);
     let wanted = |model: &Model| model.by_hand.as_ref().and_then(|hand| hand.wanted.clone());
     let mut skipped = 0;
     for _ in 0..100 {
@@ -199,12 +199,12 @@ fn a_person_who_brings_about_the_views_that_are_asked_for_gets_a_checked_answer(
         let alike: Vec<Corner> = target.points().into_iter().enumerate().map(corner).collect();
         let seen_so = planar_pose::camera_from_target(&alike, &target, &truth.intrinsics).expect("a view");
         let tip = base_from_target * seen_so.inverse() * truth.tip_from_camera.inverse();
-        bench.click(Command::Move { goal: MotionGoal::Tip(tip), what: Text::verbatim("by hand") });
+        bench.click(motion::Command::Move { goal: MotionGoal::Tip(tip), what: Text::verbatim("by hand") });
         bench.until("the arm at rest", |model| model.motion == Motion::Idle);
         let at = bench.model().robot.as_ref().expect("connected").base_from_tip;
         let is_there = |model: &Model| wanted(model).is_none_or(|now| now != view);
         if at.distance_to(&tip).0 > 0.02 {
-            bench.click(Command::SkipView);
+            bench.click(by_hand::Command::SkipView);
             skipped += 1;
         }
         bench.until("another view", is_there);

@@ -13,8 +13,8 @@ use handeye_session::Session;
 use handeye_tests::CellProcess;
 use handeye_tests::process::{end_of, signal, start, until_said};
 use handeye_tests::workbench::Workbench;
-use handeye_workbench::command::Command;
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
+use handeye_workbench::{capture, connect, motion, taught};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -132,12 +132,12 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
         let connected = model.control.is_connected() && model.camera.is_connected() && model.mover.is_connected();
         connected && model.frame.is_some() && model.cell.is_some() && model.robot.is_some()
     });
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     // So many that the pause comes between two of them, however busy the machine is.
-    bench.click(Command::SetCaptureOptions(CaptureOptions { frames: 32, ..CaptureOptions::default() }));
+    bench.click(capture::Command::SetOptions(CaptureOptions { frames: 32, ..CaptureOptions::default() }));
     bench.until("the reference poses", |model| model.taught().len() == 10);
-    bench.allow(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     let averages = |model: &Model| {
         let wait = model.capture.as_ref().map(|capture| capture.wait);
         matches!(wait, Some(CaptureWait::Images(Wait::Averaging { .. })))
@@ -147,13 +147,13 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     assert_eq!(bench.model().document().captures.len(), 1, "{}", bench.said());
 
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
-    bench.click(Command::SetCaptureOptions(CaptureOptions::default()));
-    bench.click(Command::ContinueSequence);
+    bench.click(capture::Command::SetOptions(CaptureOptions::default()));
+    bench.click(taught::Command::ContinueSequence);
     // The arm stands at the second pose, or was stopped before it: the first move is the one to the third, or to the second.
     bench.until("the first move that waits", |model| model.asked.is_some());
-    bench.click(Command::ConfirmMove);
+    bench.click(motion::Command::ConfirmMove);
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
 }

@@ -13,6 +13,7 @@ use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::workbench::Workbench;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, Model, SolveStatus};
+use handeye_workbench::{export, solve};
 
 /// The workbench gives itself 2 s to end. The rest is what a machine with other work takes to run it at all; one that waits
 /// for an answer, a motion or a file takes longer.
@@ -132,7 +133,7 @@ fn closing_in_the_middle_of_a_solve_or_an_export_takes_no_longer_and_loses_nothi
         .expect("handeye runs");
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let captures = Store::open(&session).expect("a session").document().captures.clone();
-    for under_way in [Command::Solve, Command::Export] {
+    for under_way in [Command::Solve(solve::Command::Solve), Command::Export(export::Command::Export)] {
         let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
         let mut bench = Workbench::start(address, folder.path(), Some(session.clone()));
         bench.until("a solution", |model| model.session.folder.is_some() && idle_and_fresh(model));

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use handeye_record::RerunChoice;
 use handeye_tests::workbench::Workbench;
-use handeye_workbench::command::Command as Click;
 use handeye_workbench::model::{CellSource, Step, ViewerState};
+use handeye_workbench::{session, shell};
 
 /// Set for the process in which threads are counted.
 const COUNTED: &str = "HANDEYE_TEST_COUNTED";
@@ -69,10 +69,10 @@ fn alone(test: &str) {
 
 /// One more session, in which the person goes through all steps.
 fn go_through(bench: &mut Workbench, folder: &Path) {
-    bench.click(Click::NewSession(Some(folder.to_path_buf())));
+    bench.click(session::Command::New(Some(folder.to_path_buf())));
     bench.until("the new session", |model| model.session.folder.as_deref() == Some(folder));
     for step in Step::ALL {
-        bench.click(Click::GoToStep(step));
+        bench.click(shell::Command::GoToStep(step));
         bench.until("the step", |model| model.step == step);
     }
 }

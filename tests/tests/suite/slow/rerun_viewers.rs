@@ -14,7 +14,7 @@ use handeye_tests::desktop::{self, Desktop};
 use handeye_tests::watch::Watch;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{CellProcess, handeye_binary, process};
-use handeye_workbench::command::Command as WorkbenchCommand;
+use handeye_workbench::connect;
 use handeye_workbench::model::{CellSource, Model, ViewerState};
 
 /// Longer than anything that a test waits for takes on a busy machine.
@@ -196,7 +196,7 @@ fn a_viewer_that_is_stopped_changes_neither_the_images_nor_the_bound_of_the_memo
     let source = CellSource::Address(format!("tcp://127.0.0.1:{}", cell.port()));
     let mut bench = Workbench::start_recording(source, folder.path(), None, RerunChoice::Web);
     bench.until("images", |model| model.frame.is_some() && matches!(model.rerun.viewer, ViewerState::Web { .. }));
-    bench.click(WorkbenchCommand::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     let ViewerState::Web { url } = bench.model().rerun.viewer.clone() else { panic!("no viewer") };
     let decoded = url.replace("%2B", "+").replace("%3A", ":").replace("%2F", "/");
     let sources = decoded.split("&url=").skip(1).map(str::to_owned);

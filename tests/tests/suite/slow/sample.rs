@@ -11,8 +11,8 @@ use handeye_geometry::se3;
 use handeye_result::{CalibrationResult, TransformEstimate};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{CellProcess, workspace_root};
-use handeye_workbench::command::Command;
 use handeye_workbench::model::CellSource;
+use handeye_workbench::session;
 use image::codecs::jpeg::JpegEncoder;
 
 use crate::solved::{handeye, text, utf8};
@@ -125,7 +125,7 @@ fn the_sample_is_opened_as_a_session_of_its_own_and_solved() {
     let nothing = CellSource::Address("tcp://127.0.0.1:1".to_owned());
     let mut bench = Workbench::start(nothing, &sessions, None);
     for name in ["sample", "sample-2"] {
-        bench.click(Command::OpenSample);
+        bench.click(session::Command::OpenSample);
         bench.until("its answer", |model| {
             model.session.name().as_deref() == Some(name) && model.solve.fresh && model.solve.current().is_some()
         });

@@ -6,8 +6,8 @@ use handeye_server::{CellConfig, CellServer};
 use handeye_session::Role;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, hurry};
-use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, JogSettings, Model, Motion};
+use handeye_workbench::{connect, motion, taught};
 
 /// The ten reference poses, captured and solved, and a cell to verify on. At full speed, or it takes minutes.
 fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
@@ -26,10 +26,10 @@ fn solved(folder: &std::path::Path) -> (Workbench, CellServer) {
         let connected = model.control.is_connected() && model.camera.is_connected() && model.mover.is_connected();
         connected && model.frame.is_some() && model.cell.is_some() && model.robot.is_some()
     });
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("a solution", |model| model.solve.current().is_some());
-    bench.click(Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
+    bench.click(motion::Command::SetJog(JogSettings { speed: Some(1.0), ..JogSettings::default() }));
     (bench, cell)
 }
 
@@ -41,8 +41,8 @@ fn poses(model: &Model, role: Role) -> Vec<Pose<Base, Tip>> {
 fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
-    bench.click(Command::SetConfirmMoves(false));
-    bench.allow(Command::VerifyAtPlanned);
+    bench.click(motion::Command::SetConfirmMoves(false));
+    bench.allow(taught::Command::VerifyAtPlanned);
     bench.until("the sequence", |model| model.sequence_runs);
     bench.until("its end", |model| !model.sequence_runs);
     bench.until("the verification", |model| {
@@ -68,10 +68,10 @@ fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
 fn a_stop_ends_the_verification_and_keeps_what_was_captured() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut bench, _cell) = solved(folder.path());
-    bench.click(Command::SetConfirmMoves(false));
-    bench.allow(Command::VerifyAtPlanned);
+    bench.click(motion::Command::SetConfirmMoves(false));
+    bench.allow(taught::Command::VerifyAtPlanned);
     bench.until("a capture", |model| !poses(model, Role::Verification).is_empty());
-    bench.click(Command::Stop);
+    bench.click(motion::Command::Stop);
     bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending && model.motion == Motion::Idle);
     let kept = poses(bench.model(), Role::Verification).len();
     assert!((1..5).contains(&kept), "{kept}");

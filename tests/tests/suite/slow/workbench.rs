@@ -8,9 +8,9 @@ use handeye_server::{CellConfig, CellServer};
 use handeye_session::{CaptureId, Role};
 use handeye_tests::hurry;
 use handeye_tests::workbench::Workbench;
-use handeye_workbench::command::Command;
 use handeye_workbench::model::{CapturePurpose, CellSource, Message, Model, SolveStatus};
 use handeye_workbench::text::Language;
+use handeye_workbench::{capture, connect, export, motion, session, taught};
 
 fn connected(model: &Model) -> bool {
     model.control.is_connected()
@@ -34,10 +34,10 @@ fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     let cell = CellServer::start(config).expect("a cell");
     let mut bench = Workbench::start(CellSource::Address(cell.endpoint()), sessions, None);
     bench.until("a cell", connected);
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
     bench.until("the reference poses", |model| model.taught().len() == 10);
-    bench.allow(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     bench.until("a solution", idle_and_fresh);
     assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
@@ -91,14 +91,14 @@ fn ten_poses_are_visited_captured_solved_verified_and_exported() {
     assert!(truth.focal_error_percent.is_some_and(|percent| percent < 0.2), "{truth:?}");
 
     // One more from between two poses, which verifies and never enters the fit.
-    bench.allow(Command::GoToCapture(CaptureId(3)));
+    bench.allow(motion::Command::GoToCapture(CaptureId(3)));
     bench.until("the arm at pose 3", |model| model.motion == handeye_workbench::model::Motion::Idle);
-    bench.click(Command::SetCaptureOptions(handeye_workbench::model::CaptureOptions {
+    bench.click(capture::Command::SetOptions(handeye_workbench::model::CaptureOptions {
         least_distance_m: 0.0,
         least_angle_rad: 0.0,
         ..Default::default()
     }));
-    bench.click(Command::Capture(CapturePurpose::Verify));
+    bench.click(capture::Command::Take(CapturePurpose::Verify));
     bench.until("the verification", |model| {
         model.solve.current().is_some_and(|solved| matches!(solved.verification, Some(Ok(_))))
     });
@@ -107,7 +107,7 @@ fn ten_poses_are_visited_captured_solved_verified_and_exported() {
     assert_eq!(solved.captures.len(), 10, "a capture that verifies is not in the fit");
     assert!(verification.rms_px < 0.5 && verification.centre_rms_m < 0.5e-3, "{verification:?}");
 
-    bench.click(Command::Export);
+    bench.click(export::Command::Export);
     bench.until("the exports", |model| model.export.written.is_some());
     let written = bench.model().export.written.clone().expect("written");
     let files = written.files.expect("files");
@@ -120,18 +120,18 @@ fn deleting_and_excluding_solve_again_and_undo_brings_the_same_answer_back() {
     let mut bench = captured(folder.path());
     let before = bench.model().solve.current().expect("solved").result.clone();
 
-    bench.click(Command::Delete(vec![CaptureId(2), CaptureId(5)]));
+    bench.click(session::Command::Delete(vec![CaptureId(2), CaptureId(5)]));
     bench.until("eight captures", |model| model.document().captures.len() == 8 && idle_and_fresh(model));
     assert_ne!(bench.model().solve.current().expect("solved").result.hand_eye, before.hand_eye);
-    bench.click(Command::SetExcluded { ids: vec![CaptureId(7)], excluded: true });
+    bench.click(session::Command::SetExcluded { ids: vec![CaptureId(7)], excluded: true });
     bench.until("seven in the fit", |model| model.document().in_use().count() == 7 && idle_and_fresh(model));
     for _ in 0..2 {
         bench.until("something to undo", |model| model.session.undo.is_some());
-        bench.click(Command::Undo);
+        bench.click(session::Command::Undo);
     }
     bench.until("ten captures", |model| model.document().in_use().count() == 10 && idle_and_fresh(model));
     assert_eq!(bench.model().solve.current().expect("solved").result, before, "to the last bit");
-    bench.click(Command::Redo);
+    bench.click(session::Command::Redo);
     bench.until("eight captures", |model| model.document().captures.len() == 8);
 }
 
@@ -139,8 +139,8 @@ fn deleting_and_excluding_solve_again_and_undo_brings_the_same_answer_back() {
 fn a_session_is_opened_again_as_it_was_and_solves_to_the_same_bits_as_the_command_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut bench = captured(folder.path());
-    bench.click(Command::SetExcluded { ids: vec![CaptureId(4)], excluded: true });
-    bench.click(Command::SetPurpose { ids: vec![CaptureId(6)], purpose: CapturePurpose::Verify });
+    bench.click(session::Command::SetExcluded { ids: vec![CaptureId(4)], excluded: true });
+    bench.click(session::Command::SetPurpose { ids: vec![CaptureId(6)], purpose: CapturePurpose::Verify });
     bench.until("the changes", |model| model.document().in_use().count() == 8 && idle_and_fresh(model));
     let session = bench.model().session.folder.clone().expect("a folder");
     let (document, solved) = (bench.model().session.document.clone(), bench.model().solve.current().cloned());
@@ -176,9 +176,9 @@ fn a_stop_ends_the_sequence_and_keeps_what_was_captured() {
     let mut bench = Workbench::start(CellSource::default(), folder.path(), None);
     bench.until("a cell", connected);
     bench.until("the reference poses", |model| model.taught().len() == 10);
-    bench.click(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+    bench.click(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("two captures", |model| model.document().captures.len() >= 2);
-    bench.click(Command::Stop);
+    bench.click(motion::Command::Stop);
     bench.until("the arm at rest", |model| !model.sequence_runs && !model.stop_pending);
     let kept = bench.model().document().captures.len();
     assert!((2..10).contains(&kept), "{kept}");
@@ -205,9 +205,9 @@ fn a_session_that_cannot_be_opened_says_why_and_leaves_the_present_one_alone() {
     std::fs::write(broken.join("session.json"), "{ \"format\": \"handeye-session\", \"vers").expect("a file");
     let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
     let mut bench = Workbench::start(address, folder.path(), None);
-    bench.click(Command::NewSession(Some(folder.path().join("mine"))));
+    bench.click(session::Command::New(Some(folder.path().join("mine"))));
     bench.until("a session", |model| model.session.folder.is_some());
-    bench.click(Command::Open(broken));
+    bench.click(session::Command::Open(broken));
     bench.until("the answer", |model| {
         let said = |message: &Message| message.text.say(Language::English).contains("was not opened");
         !model.opening && model.messages.iter().any(said)
@@ -221,13 +221,13 @@ fn a_server_that_never_answers_is_left_for_a_cell_and_the_session_stays_open() {
     let silent = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("tcp://{}", silent.local_addr().expect("an address"));
     let mut bench = Workbench::start(CellSource::Address(address), folder.path(), None);
-    bench.click(Command::NewSession(Some(folder.path().join("mine"))));
+    bench.click(session::Command::New(Some(folder.path().join("mine"))));
     bench.until("a session", |model| model.session.folder.is_some());
 
     let cell = CellServer::start(CellConfig::new(Scene::reference().expect("the scene"))).expect("a cell");
-    bench.click(Command::Connect(CellSource::Address(cell.endpoint())));
+    bench.click(connect::Command::Connect(CellSource::Address(cell.endpoint())));
     bench.until("the cell", |model| model.control.is_connected() && model.camera.is_connected());
-    bench.click(Command::StartSimulation);
+    bench.click(connect::Command::StartSimulation);
     bench.until("the board in an image", |model| {
         model.detection.as_ref().is_some_and(|detection| detection.corners.is_some())
     });
@@ -255,7 +255,7 @@ fn recorded_images_and_poses_are_opened_as_a_session_and_stay_as_they_are() {
     }
     let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
     let mut bench = Workbench::start(address, &folder.path().join("others"), None);
-    bench.click(Command::Open(dataset.clone()));
+    bench.click(session::Command::Open(dataset.clone()));
     bench.until("its answer", idle_and_fresh);
     assert_eq!(bench.model().document().captures.len(), 10);
     assert_eq!(bench.model().solve.current().expect("solved").result.hand_eye, expected, "to the last bit");

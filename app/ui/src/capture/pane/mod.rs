@@ -20,11 +20,12 @@ use crate::shell::sequence;
 use crate::style::marks::{self, Marks};
 use crate::style::theme::{self, Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, Moves, PoseSequence};
 use handeye_workbench::scene::Standing;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{capture, session, taught};
 
 /// Most images that are averaged: more take longer than they help.
 const MOST_FRAMES: u32 = 64;
@@ -102,7 +103,7 @@ fn sample_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     );
     let button = ui.add_enabled(!model.opening, Button::new(tr!(language, "Open a sample")));
     if button.on_hover_text(what).clicked() {
-        outbox.send(Command::OpenSample);
+        outbox.send(session::Command::OpenSample);
     }
 }
 
@@ -119,7 +120,7 @@ fn actions_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, height: f32, out
             };
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, hindrance.is_none(), name));
             if response.clicked() {
-                outbox.send(Command::Capture(purpose));
+                outbox.send(capture::Command::Take(purpose));
             }
         };
         let name = tr!(language, "Capture");
@@ -142,7 +143,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     let language = model.view.language;
     if model.sequence_runs {
         if ui.button(tr!(language, "Stop the sequence")).clicked() {
-            outbox.send(Command::StopSequence);
+            outbox.send(taught::Command::StopSequence);
         }
         return;
     }
@@ -171,7 +172,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
         None => button.on_hover_text(what),
     };
     if button.clicked() {
-        outbox.send(Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
+        outbox.send(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     }
 }
 
@@ -187,7 +188,7 @@ fn frames_ui(ui: &mut Ui, options: CaptureOptions, language: Language, outbox: &
         ..WidgetInfo::labeled(WidgetType::DragValue, true, name)
     });
     if frames != options.frames {
-        outbox.send(Command::SetCaptureOptions(CaptureOptions { frames, ..options }));
+        outbox.send(capture::Command::SetOptions(CaptureOptions { frames, ..options }));
     }
 }
 
@@ -213,11 +214,11 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         (text!("Exclude {count}", count = count), what)
     };
     if ui.button(name.say(language)).on_hover_text(what).clicked() {
-        outbox.send(Command::SetExcluded { ids: ids.clone(), excluded: !all_out });
+        outbox.send(session::Command::SetExcluded { ids: ids.clone(), excluded: !all_out });
     }
     let what = tr!(language, "Deletes the selected captures; undo brings them back");
     if ui.button(text!("Delete {count}", count = count).say(language)).on_hover_text(what).clicked() {
-        outbox.send(Command::Delete(ids));
+        outbox.send(session::Command::Delete(ids));
     }
 }
 
@@ -254,7 +255,7 @@ fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let layout = Layout::right_to_left(Align::Center);
     ui.scope_builder(egui::UiBuilder::new().max_rect(inner).layout(layout), |ui| {
         if model.capture.is_some() && ui.button(tr!(language, "Cancel capture")).clicked() {
-            outbox.send(Command::CancelCapture);
+            outbox.send(capture::Command::Cancel);
         }
         ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
             if tone == Tone::Busy {

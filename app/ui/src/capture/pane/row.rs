@@ -13,8 +13,9 @@ use crate::style::marks::{self, Marks};
 use crate::style::numbers;
 use crate::style::theme::{CAPTION, Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::session;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -162,7 +163,7 @@ fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: Language, outbox:
     let name = text!("Use capture {id}", id = row.id).say(language);
     response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, used, &name));
     if response.changed() {
-        outbox.send(Command::SetExcluded { ids: vec![row.id], excluded: !used });
+        outbox.send(session::Command::SetExcluded { ids: vec![row.id], excluded: !used });
     }
 }
 

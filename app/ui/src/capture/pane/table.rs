@@ -13,6 +13,7 @@ use crate::style::theme::Palette;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{CapturePurpose, Model, RefusalKind};
 use handeye_workbench::tr;
+use handeye_workbench::{motion, session};
 
 /// What the table remembers from one frame to the next: how it is looked at.
 #[derive(Debug, Clone, Copy, Default)]
@@ -90,7 +91,7 @@ fn select(
     }
     look.in_view = Some(id);
     if next != model.selection {
-        outbox.send(Command::Select(next));
+        outbox.send(session::Command::Select(next));
     }
 }
 
@@ -119,10 +120,10 @@ fn keys_ui(ui: &Ui, model: &Model, order: &[CaptureId], look: &mut Look, outbox:
         }
     }
     if pressed(Modifiers::COMMAND, Key::A) {
-        outbox.send(Command::Select(order.to_vec()));
+        outbox.send(session::Command::Select(order.to_vec()));
     }
     if !model.selection.is_empty() && pressed(Modifiers::NONE, Key::Delete) {
-        outbox.send(Command::Delete(model.selection.clone()));
+        outbox.send(session::Command::Delete(model.selection.clone()));
     }
 }
 
@@ -161,22 +162,22 @@ fn menu_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, row: &CaptureRow, o
         }
     };
     if model.document().mode().is_some() {
-        item(ui, tr!(language, "Go there again"), Command::GoToCapture(row.id));
+        item(ui, tr!(language, "Go there again"), motion::Command::GoToCapture(row.id).into());
         ui.separator();
     }
     let every = |is: fn(&CaptureRow) -> bool| ids.iter().filter_map(|&id| table.row(id)).all(is);
     if every(|row| row.excluded) {
-        item(ui, tr!(language, "Include"), Command::SetExcluded { ids: ids.clone(), excluded: false });
+        item(ui, tr!(language, "Include"), session::Command::SetExcluded { ids: ids.clone(), excluded: false }.into());
     } else {
-        item(ui, tr!(language, "Exclude"), Command::SetExcluded { ids: ids.clone(), excluded: true });
+        item(ui, tr!(language, "Exclude"), session::Command::SetExcluded { ids: ids.clone(), excluded: true }.into());
     }
     if every(|row| row.role == Role::Verification) {
-        let command = Command::SetPurpose { ids: ids.clone(), purpose: CapturePurpose::Calibrate };
+        let command = session::Command::SetPurpose { ids: ids.clone(), purpose: CapturePurpose::Calibrate }.into();
         item(ui, tr!(language, "Use for the fit"), command);
     } else if model.document().mode().is_some() {
-        let command = Command::SetPurpose { ids: ids.clone(), purpose: CapturePurpose::Verify };
+        let command = session::Command::SetPurpose { ids: ids.clone(), purpose: CapturePurpose::Verify }.into();
         item(ui, tr!(language, "Use for verification"), command);
     }
     ui.separator();
-    item(ui, tr!(language, "Delete"), Command::Delete(ids.clone()));
+    item(ui, tr!(language, "Delete"), session::Command::Delete(ids.clone()).into());
 }

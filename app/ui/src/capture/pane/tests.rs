@@ -8,10 +8,12 @@ use handeye_session::{CaptureId, CaptureRecord};
 use super::columns::{Column, Sort, sorted};
 use super::*;
 use crate::testing::pane_harness::{PaneHarness, PaneState};
+use handeye_workbench::command::Command;
 use handeye_workbench::guided::state::{GuidedProgress, Waits};
 use handeye_workbench::model::{CaptureRefused, Goal, RefusalKind, StopOutcome};
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
+use handeye_workbench::{capture, motion, session, taught};
 
 fn pane(model: Model) -> PaneHarness {
     PaneHarness::new(model, vec2(760.0, 420.0), |ui, state| {
@@ -45,7 +47,7 @@ fn click_row(pane: &mut PaneHarness, id: u32, modifiers: Modifiers) -> Vec<Comma
     pane.steps();
     let sent = pane.commands();
     for command in &sent {
-        if let Command::Select(ids) = command {
+        if let Command::Session(session::Command::Select(ids)) = command {
             pane.model().selection = ids.clone();
         }
     }
@@ -75,9 +77,12 @@ fn ids(numbers: &[u32]) -> Vec<CaptureId> {
 fn an_empty_session_says_what_to_do_and_captures() {
     let mut pane = pane(sample::connected());
     assert!(pane.sees("No captures yet") && pane.sees("press Space"));
-    assert_eq!(pane.click("Open a sample"), [Command::OpenSample]);
-    assert_eq!(pane.click("Capture"), [Command::Capture(CapturePurpose::Calibrate)]);
-    assert_eq!(pane.click("Capture for verification"), [Command::Capture(CapturePurpose::Verify)]);
+    assert_eq!(pane.click("Open a sample"), [Command::Session(session::Command::OpenSample)]);
+    assert_eq!(pane.click("Capture"), [Command::Capture(capture::Command::Take(CapturePurpose::Calibrate))]);
+    assert_eq!(
+        pane.click("Capture for verification"),
+        [Command::Capture(capture::Command::Take(CapturePurpose::Verify))]
+    );
     pane.model().camera = handeye_workbench::model::LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
     assert!(pane.click("Capture").is_empty(), "there is nothing to capture");
@@ -86,15 +91,18 @@ fn an_empty_session_says_what_to_do_and_captures() {
 #[test]
 fn rows_are_selected_by_clicks_and_keys() {
     let mut pane = pane(sample::solved());
-    assert_eq!(click_row(&mut pane, 2, Modifiers::NONE), [Command::Select(ids(&[2]))]);
-    assert_eq!(click_row(&mut pane, 4, Modifiers::SHIFT), [Command::Select(ids(&[2, 3, 4]))]);
-    assert_eq!(click_row(&mut pane, 3, Modifiers::COMMAND), [Command::Select(ids(&[2, 4]))]);
+    assert_eq!(click_row(&mut pane, 2, Modifiers::NONE), [Command::Session(session::Command::Select(ids(&[2])))]);
+    assert_eq!(
+        click_row(&mut pane, 4, Modifiers::SHIFT),
+        [Command::Session(session::Command::Select(ids(&[2, 3, 4])))]
+    );
+    assert_eq!(click_row(&mut pane, 3, Modifiers::COMMAND), [Command::Session(session::Command::Select(ids(&[2, 4])))]);
     pane.harness.key_press(Key::ArrowDown);
     pane.steps();
-    assert_eq!(pane.commands(), [Command::Select(ids(&[5]))]);
+    assert_eq!(pane.commands(), [Command::Session(session::Command::Select(ids(&[5])))]);
     pane.harness.key_press(Key::Delete);
     pane.steps();
-    assert_eq!(pane.commands(), [Command::Delete(ids(&[2, 4]))]);
+    assert_eq!(pane.commands(), [Command::Session(session::Command::Delete(ids(&[2, 4])))]);
     pane.harness.key_press(Key::Space);
     pane.steps();
     assert!(pane.commands().is_empty(), "Space belongs to the window");
@@ -103,7 +111,8 @@ fn rows_are_selected_by_clicks_and_keys() {
 #[test]
 fn a_capture_is_taken_out_and_in_by_its_box_and_by_the_buttons() {
     let mut pane = pane(sample::solved());
-    let out = |numbers: &[u32], excluded| Command::SetExcluded { ids: ids(numbers), excluded };
+    let out =
+        |numbers: &[u32], excluded| Command::Session(session::Command::SetExcluded { ids: ids(numbers), excluded });
     assert_eq!(pane.click("Use capture 3"), [out(&[3], true)]);
     change(pane.model(), |captures| captures[2].excluded = true);
     pane.steps();
@@ -111,7 +120,7 @@ fn a_capture_is_taken_out_and_in_by_its_box_and_by_the_buttons() {
     pane.model().selection = ids(&[1, 3]);
     pane.steps();
     assert_eq!(pane.click("Exclude 2"), [out(&[1, 3], true)]);
-    assert_eq!(pane.click("Delete 2"), [Command::Delete(ids(&[1, 3]))]);
+    assert_eq!(pane.click("Delete 2"), [Command::Session(session::Command::Delete(ids(&[1, 3])))]);
     pane.model().selection = ids(&[3]);
     pane.steps();
     assert_eq!(pane.click("Include 1"), [out(&[3], false)]);
@@ -126,10 +135,13 @@ fn the_menu_of_a_row_goes_there_and_changes_what_it_is_for() {
         pane.steps();
         pane.click(item)
     };
-    assert_eq!(choose("Go there again"), [Command::GoToCapture(CaptureId(2))]);
+    assert_eq!(choose("Go there again"), [Command::Motion(motion::Command::GoToCapture(CaptureId(2)))]);
     let purpose = CapturePurpose::Verify;
-    assert_eq!(choose("Use for verification"), [Command::SetPurpose { ids: ids(&[2]), purpose }]);
-    assert_eq!(choose("Delete"), [Command::Delete(ids(&[2]))]);
+    assert_eq!(
+        choose("Use for verification"),
+        [Command::Session(session::Command::SetPurpose { ids: ids(&[2]), purpose })]
+    );
+    assert_eq!(choose("Delete"), [Command::Session(session::Command::Delete(ids(&[2])))]);
 }
 
 #[test]
@@ -265,7 +277,7 @@ fn guided_capture_that_was_broken_off_between_two_poses_or_at_a_check_is_continu
     };
     for ending in [None, Some(Ending::GoalReached { error_m: 3e-4 })] {
         let mut pane = pane(guided(ending));
-        assert_eq!(pane.click("Continue the sequence"), [Command::ContinueSequence]);
+        assert_eq!(pane.click("Continue the sequence"), [Command::Taught(taught::Command::ContinueSequence)]);
     }
     let mut over = guided(Some(Ending::GoalReached { error_m: 3e-4 }));
     over.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("guided").is_over = true;

@@ -250,6 +250,7 @@ mod tests {
     use crate::connect::pane::connect_ui;
     use crate::testing::driven::Driven;
     use handeye_workbench::command::Command;
+    use handeye_workbench::connect;
     use handeye_workbench::testing::sample;
 
     fn drivers(robot: Option<&str>, camera: Option<&str>) -> CellSource {
@@ -273,7 +274,10 @@ mod tests {
         assert!(pane.nothing_is_cut_off());
         let robot = "handeye driver ur-rtde --host 192.168.0.7 --arm ur5e";
         assert!(pane.sees(robot));
-        assert_eq!(pane.click("Connect now"), [Command::Connect(drivers(Some(robot), None))]);
+        assert_eq!(
+            pane.click("Connect now"),
+            [Command::Connect(connect::Command::Connect(drivers(Some(robot), None)))]
+        );
     }
 
     #[test]
@@ -289,7 +293,7 @@ mod tests {
             Some("handeye driver fake --scene panda"),
             Some("handeye driver folder '/data/my images' --images-only"),
         );
-        assert_eq!(pane.click("Connect now"), [Command::Connect(wanted)]);
+        assert_eq!(pane.click("Connect now"), [Command::Connect(connect::Command::Connect(wanted))]);
         assert!(pane.nothing_is_cut_off());
     }
 
@@ -307,7 +311,7 @@ mod tests {
         let robot =
             "handeye driver rosbridge --url ws://10.0.0.3:9090 --base-frame base_link --tip-frame tool0 --rectified";
         let wanted = drivers(Some(robot), Some("tcp://10.0.0.4:7000"));
-        assert_eq!(pane.click("Connect now"), [Command::Connect(wanted)]);
+        assert_eq!(pane.click("Connect now"), [Command::Connect(connect::Command::Connect(wanted))]);
     }
 
     #[test]
@@ -318,6 +322,6 @@ mod tests {
         assert!(!pane.sees("Base frame") && !pane.sees("Driver of the robot"));
         pane.type_into("Camera: Image topic", "/image");
         let wanted = drivers(None, Some("handeye driver rosbridge --image /image"));
-        assert_eq!(pane.click("Connect now"), [Command::Connect(wanted)]);
+        assert_eq!(pane.click("Connect now"), [Command::Connect(connect::Command::Connect(wanted))]);
     }
 }

@@ -7,7 +7,8 @@ use handeye_geometry::frames::Pose;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::connect;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
@@ -62,7 +63,7 @@ pub fn typed_pose_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     }
     let taken = ui.add_enabled(read.is_ok(), Button::new(tr!(language, "The robot stands here")));
     if let (true, Ok(pose)) = (taken.clicked(), read) {
-        outbox.send(Command::TypePose(Pose::from_isometry(pose)));
+        outbox.send(connect::Command::TypePose(Pose::from_isometry(pose)));
         draft.numbers.clear();
     }
     ui.data_mut(|data| data.insert_temp(id, draft));
@@ -123,6 +124,7 @@ mod tests {
 
     use super::*;
     use crate::testing::driven::Driven;
+    use handeye_workbench::command::Command;
     use handeye_workbench::testing::sample;
 
     fn pane() -> Driven {
@@ -137,7 +139,7 @@ mod tests {
         assert!(pane.sees("After each capture the next pose is wanted"));
         pane.retype("Numbers of the pose", "400 -100 300 0 3.0 0");
         let commands = pane.click("The robot stands here");
-        let [Command::TypePose(pose)] = commands.as_slice() else { panic!("{commands:?}") };
+        let [Command::Connect(connect::Command::TypePose(pose))] = commands.as_slice() else { panic!("{commands:?}") };
         let wanted: Pose<Base, Tip> =
             Pose::from_isometry(typed_pose::read("0.4 -0.1 0.3 0 3 0", 1.0, TypedRotation::default()).expect("a pose"));
         assert!(pose.distance_to(&wanted).0 < 1e-12);

@@ -8,7 +8,8 @@ use handeye_export::Format;
 use super::preview;
 use crate::style::parts;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::export;
 use handeye_workbench::model::Model;
 use handeye_workbench::tr;
 
@@ -18,14 +19,14 @@ pub fn formats_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     parts::section_with_ui(ui, tr!(language, "Formats"), |ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if ui.add(parts::small_button(ui, tr!(language, "Choose none"))).clicked() {
-                outbox.send(Command::ChooseFormats(BTreeSet::new()));
+                outbox.send(export::Command::ChooseFormats(BTreeSet::new()));
             }
             if ui.add(parts::small_button(ui, tr!(language, "Choose all"))).clicked() {
                 let possible = handeye_export::formats()
                     .iter()
                     .map(|format| format.name())
                     .filter(|name| is_possible(model, name));
-                outbox.send(Command::ChooseFormats(possible.map(str::to_owned).collect()));
+                outbox.send(export::Command::ChooseFormats(possible.map(str::to_owned).collect()));
             }
         });
     });
@@ -62,7 +63,7 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
             } else {
                 chosen.remove(name);
             }
-            outbox.send(Command::ChooseFormats(chosen));
+            outbox.send(export::Command::ChooseFormats(chosen));
         }
         if refusal.is_some() {
             return;
@@ -73,7 +74,7 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
             let said = text!("Show {format}", format = name).say(language);
             response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_shown, &said));
             if response.clicked() {
-                outbox.send(Command::ShowFormat((!is_shown).then(|| name.to_owned())));
+                outbox.send(export::Command::ShowFormat((!is_shown).then(|| name.to_owned())));
             }
         });
     });

@@ -7,7 +7,8 @@ use handeye_export::ExportNames;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::export;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
@@ -63,7 +64,7 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     match draft.names.check() {
         Err(error) => parts::notice_ui(ui, Tone::Bad, &Text::from(error).say(language), |_| ()),
         Ok(()) if is_left && draft.names != model.export.names => {
-            outbox.send(Command::SetExportNames(draft.names.clone()));
+            outbox.send(export::Command::SetNames(draft.names.clone()));
             // It is shown as it was until the names are taken.
             draft.from = None;
         }

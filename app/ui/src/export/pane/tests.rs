@@ -8,6 +8,7 @@ use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{Dialog, Written};
 use handeye_workbench::testing::sample;
+use handeye_workbench::{export, shell};
 
 /// The sample with previews as the worker makes them.
 fn model() -> Model {
@@ -33,10 +34,13 @@ fn formats_are_chosen_and_left_out() {
     let mut pane = driven(model());
     let before = pane.model().export.chosen.clone();
     let sent = pane.click("json");
-    let [Command::ChooseFormats(chosen)] = &sent[..] else { panic!("{sent:?}") };
+    let [Command::Export(export::Command::ChooseFormats(chosen))] = &sent[..] else { panic!("{sent:?}") };
     assert!(!chosen.contains("json") && chosen.len() + 1 == before.len());
-    assert_eq!(pane.click("Choose none"), [Command::ChooseFormats(std::collections::BTreeSet::new())]);
-    assert_eq!(pane.click("Export 4 formats"), [Command::Export]);
+    assert_eq!(
+        pane.click("Choose none"),
+        [Command::Export(export::Command::ChooseFormats(std::collections::BTreeSet::new()))]
+    );
+    assert_eq!(pane.click("Export 4 formats"), [Command::Export(export::Command::Export)]);
 }
 
 #[test]
@@ -55,7 +59,10 @@ fn a_format_that_cannot_hold_the_result_says_why_and_is_not_written() {
 #[test]
 fn the_text_of_a_format_is_read_before_it_is_written() {
     let mut pane = driven(model());
-    assert_eq!(pane.click("Show opencv_yaml"), [Command::ShowFormat(Some("opencv_yaml".to_owned()))]);
+    assert_eq!(
+        pane.click("Show opencv_yaml"),
+        [Command::Export(export::Command::ShowFormat(Some("opencv_yaml".to_owned())))]
+    );
     pane.model().export.shown = Some("opencv_yaml".to_owned());
     pane.steps();
     let file = match pane.model().export.previews.get("opencv_yaml") {
@@ -88,7 +95,7 @@ fn names_are_sent_when_they_are_complete_and_can_be_used() {
     pane.type_into("Robot tip", "_ee");
     assert!(pane.commands().is_empty(), "it is still being typed");
     let sent = pane.press(Key::Enter);
-    let [Command::SetExportNames(names)] = &sent[..] else { panic!("{sent:?}") };
+    let [Command::Export(export::Command::SetNames(names))] = &sent[..] else { panic!("{sent:?}") };
     assert_eq!(names.effector_frame, "tool0_ee");
     pane.type_into("Robot tip", " $");
     assert!(pane.sees("cannot be used as a name"));
@@ -99,11 +106,11 @@ fn names_are_sent_when_they_are_complete_and_can_be_used() {
 fn the_folder_is_chosen_or_that_of_the_session() {
     let mut pane = driven(model());
     assert!(pane.sees("sessions/sample/exports"));
-    assert_eq!(pane.click("Choose folder…"), [Command::SetDialog(Some(Dialog::ExportFolder))]);
+    assert_eq!(pane.click("Choose folder…"), [Command::Shell(shell::Command::SetDialog(Some(Dialog::ExportFolder)))]);
     pane.model().export.folder = Some(PathBuf::from("/elsewhere"));
     pane.steps();
     assert!(pane.sees("/elsewhere"));
-    assert_eq!(pane.click("In the session"), [Command::SetExportFolder(None)]);
+    assert_eq!(pane.click("In the session"), [Command::Export(export::Command::SetFolder(None))]);
 }
 
 #[test]

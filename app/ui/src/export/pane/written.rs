@@ -8,9 +8,10 @@ use super::{blocked, formats};
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Dialog, Model, exports_of};
 use handeye_workbench::tr;
+use handeye_workbench::{export, session, shell};
 
 /// Where to, and the button.
 pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -28,13 +29,13 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let reason = why_not(model);
         let name = text!("Export {count} {count|format|formats}", count = chosen).say(language);
         if parts::gated_ui(ui, reason, Button::new(RichText::new(name).strong())).clicked() {
-            outbox.send(Command::Export);
+            outbox.send(export::Command::Export);
         }
         if ui.button(tr!(language, "Choose folder…")).clicked() {
-            outbox.send(Command::SetDialog(Some(Dialog::ExportFolder)));
+            outbox.send(shell::Command::SetDialog(Some(Dialog::ExportFolder)));
         }
         if model.export.folder.is_some() && ui.button(tr!(language, "In the session")).clicked() {
-            outbox.send(Command::SetExportFolder(None));
+            outbox.send(export::Command::SetFolder(None));
         }
         if model.in_browser
             && model.export.is_present
@@ -42,7 +43,7 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 model.export.folder.clone().or_else(|| Some(exports_of(model.session.folder.as_ref()?)))
             && ui.button(tr!(language, "Download as one archive")).clicked()
         {
-            outbox.send(Command::OpenFolder(folder));
+            outbox.send(session::Command::OpenFolder(folder));
         }
         if model.export.writing {
             ui.add(Spinner::new().size(16.0));

@@ -3,7 +3,8 @@
 use egui::{ComboBox, Ui, WidgetInfo, WidgetType};
 
 use crate::style::parts;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::import;
 use handeye_workbench::model::{Found, ImportState};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
@@ -39,7 +40,7 @@ pub fn fixed_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Lang
                 for (value, said) in std::iter::once((None, by_data)).chain(values.iter().map(|v| (Some(*v), *v))) {
                     if ui.selectable_label(now == value, said).clicked() && now != value {
                         let value = value.map(str::to_owned);
-                        outbox.send(Command::FixConvention { key: key.to_owned(), value });
+                        outbox.send(import::Command::FixConvention { key: key.to_owned(), value });
                     }
                 }
             });

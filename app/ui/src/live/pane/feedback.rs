@@ -16,9 +16,10 @@ use crate::style::marks::{self, Marks};
 use crate::style::parts;
 use crate::style::theme::{CARD_RADIUS, Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
 use handeye_workbench::tr;
+use handeye_workbench::{capture, session};
 
 /// Height of the strip over a recorded image.
 pub const STRIP: f32 = 34.0;
@@ -90,7 +91,7 @@ pub fn review_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox)
     let inner = rect.shrink2(Vec2::new(super::INSET, 0.0));
     ui.scope_builder(UiBuilder::new().max_rect(inner).layout(Layout::right_to_left(Align::Center)), |ui| {
         if ui.button(tr!(language, "Back to live")).clicked() {
-            outbox.send(Command::BackToLive);
+            outbox.send(session::Command::BackToLive);
         }
         ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
             let words = rms.map_or_else(|| title.clone(), |rms| format!("{title} · {rms}"));
@@ -128,7 +129,7 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
         let words = waiting(capture).say(language);
         plate_ui(ui, room, Tone::Busy, &words, |ui| {
             if ui.add(parts::small_button(ui, tr!(language, "Cancel"))).clicked() {
-                outbox.send(Command::CancelCapture);
+                outbox.send(capture::Command::Cancel);
             }
         });
     } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_image(model)) {

@@ -30,7 +30,7 @@ const FOOTER: f32 = 46.0;
 const INSET: f32 = 10.0;
 
 /// The colour image with everything drawn over it. Gives the pixel under the pointer: of both images one at most
-/// has one, and whoever draws both tells the model with `Command::PointAt`.
+/// has one, and whoever draws both tells the model with `live::Command::PointAt`.
 pub fn colour_ui(ui: &mut Ui, model: &Model, textures: &LiveTextures, outbox: &mut Outbox) -> Option<ImagePoint> {
     let language = model.view.language;
     let shown = match content(model, textures) {

@@ -17,6 +17,7 @@ use handeye_workbench::model::{
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
+use handeye_workbench::{capture, live, session};
 
 fn colour(model: Model) -> PaneHarness {
     PaneHarness::new(model, vec2(660.0, 580.0), |ui, state| {
@@ -41,7 +42,7 @@ fn reviewed(id: u32) -> Model {
 /// The newest viewport that was asked for.
 fn viewport(commands: &[Command]) -> Option<Viewport> {
     commands.iter().rev().find_map(|command| match command {
-        Command::SetViewport(viewport) => Some(*viewport),
+        Command::Live(live::Command::SetViewport(viewport)) => Some(*viewport),
         _ => None,
     })
 }
@@ -201,13 +202,22 @@ fn overlays_and_depth_colours_are_switched_by_their_names() {
     let mut pane = colour(sample::solved());
     let overlays = pane.model().view.overlays;
     let sent = pane.click("Coverage");
-    assert_eq!(sent, [Command::SetOverlays(handeye_workbench::model::Overlays { coverage: true, ..overlays })]);
+    assert_eq!(
+        sent,
+        [Command::Live(live::Command::SetOverlays(handeye_workbench::model::Overlays { coverage: true, ..overlays }))]
+    );
     let sent = pane.click("Corners");
-    assert_eq!(sent, [Command::SetOverlays(handeye_workbench::model::Overlays { corners: false, ..overlays })]);
+    assert_eq!(
+        sent,
+        [Command::Live(live::Command::SetOverlays(handeye_workbench::model::Overlays { corners: false, ..overlays }))]
+    );
     assert!(pane.sees("Residuals × "), "how many times longer than they are is stated on the image");
     let mut pane = depth(sample::connected());
-    assert_eq!(pane.click("Viridis"), [Command::SetDepthColours(ColourMap::Viridis)]);
-    assert_eq!(pane.click("Full range"), [Command::SetDepthScale(handeye_workbench::model::DepthScale::Full)]);
+    assert_eq!(pane.click("Viridis"), [Command::Live(live::Command::SetDepthColours(ColourMap::Viridis))]);
+    assert_eq!(
+        pane.click("Full range"),
+        [Command::Live(live::Command::SetDepthScale(handeye_workbench::model::DepthScale::Full))]
+    );
     assert!(pane.sees("Depth colours from 0.30 m to 0.50 m"));
 }
 
@@ -249,13 +259,13 @@ fn a_recorded_image_says_so_and_leads_back() {
     let mut pane = colour(reviewed(3));
     assert!(pane.sees("Capture 3 · pose 3, recorded · residual 0.0"));
     assert!(!pane.sees("fps"), "a recorded image has no frame rate");
-    assert_eq!(pane.click("Back to live"), [Command::BackToLive]);
+    assert_eq!(pane.click("Back to live"), [Command::Session(session::Command::BackToLive)]);
     let mut pane = colour(reviewed(sample::FITTED + 1));
     assert!(pane.sees("prediction error"), "the verification fits nothing");
     pane.model().review = Some(Review { id: CaptureId(3), images: None });
     pane.steps();
     assert!(pane.sees("Reading the images of this capture…"));
-    assert_eq!(pane.click("Back to live"), [Command::BackToLive]);
+    assert_eq!(pane.click("Back to live"), [Command::Session(session::Command::BackToLive)]);
 }
 
 #[test]
@@ -282,7 +292,7 @@ fn a_click_picks_a_point_in_the_step_that_verifies_and_only_in_the_live_image() 
     assert!(sent.is_empty(), "{sent:?}");
     model.step = Step::Verify;
     let (sent, px) = click(&mut colour(model));
-    assert_eq!(sent, [Command::Pick(Some(ImagePoint { column: px.x as u32, row: px.y as u32 }))]);
+    assert_eq!(sent, [Command::Live(live::Command::Pick(Some(ImagePoint { column: px.x as u32, row: px.y as u32 })))]);
     let mut model = reviewed(1);
     model.step = Step::Verify;
     assert!(click(&mut colour(model)).0.is_empty());
@@ -295,7 +305,7 @@ fn a_capture_says_what_it_waits_for_and_a_refusal_goes_away() {
     model.capture = Some(CaptureUnderWay { number: 1, purpose: CapturePurpose::Calibrate, wait, since_s: 99.0 });
     let mut pane = colour(model);
     assert!(pane.sees("Capturing… waiting for the robot to stand still"));
-    assert_eq!(pane.click("Cancel"), [Command::CancelCapture]);
+    assert_eq!(pane.click("Cancel"), [Command::Capture(capture::Command::Cancel)]);
     pane.model().capture = None;
     let why = Text::verbatim("the board is not in view");
     pane.model().refused = Some(CaptureRefused { kind: RefusalKind::NoBoard, why, at_s: 99.0 });

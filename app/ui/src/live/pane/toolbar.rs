@@ -3,7 +3,8 @@
 use egui::{RichText, Ui};
 use handeye_geometry::depth::ColourMap;
 
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::live;
 use handeye_workbench::model::{DepthScale, Model};
 use handeye_workbench::tr;
 
@@ -47,7 +48,7 @@ pub fn overlays_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         );
     });
     if now != before {
-        outbox.send(Command::SetOverlays(now));
+        outbox.send(live::Command::SetOverlays(now));
     }
 }
 
@@ -75,7 +76,7 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         ] {
             let chosen = model.view.depth_colours == map;
             if ui.selectable_label(chosen, name).on_hover_text(what).clicked() && !chosen {
-                outbox.send(Command::SetDepthColours(map));
+                outbox.send(live::Command::SetDepthColours(map));
             }
         }
         ui.separator();
@@ -93,7 +94,7 @@ pub fn depth_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         ] {
             let chosen = model.view.depth_scale == scale;
             if ui.selectable_label(chosen, RichText::new(name)).on_hover_text(what).clicked() && !chosen {
-                outbox.send(Command::SetDepthScale(scale));
+                outbox.send(live::Command::SetDepthScale(scale));
             }
         }
     });

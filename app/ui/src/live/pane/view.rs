@@ -8,7 +8,8 @@ use crate::live::place::{LARGEST_ZOOM, Place, held};
 use crate::status::STALE_AFTER_S;
 use crate::style::marks::{self, Marks};
 use crate::style::theme::{self, Palette};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::live;
 use handeye_workbench::model::{ImagePoint, Model, Step, Viewport};
 
 /// Zoom per point of wheel movement; a notch of a wheel is about 50 points.
@@ -89,7 +90,7 @@ impl Image<'_> {
             next = Viewport::default();
         }
         if next != now {
-            outbox.send(Command::SetViewport(next));
+            outbox.send(live::Command::SetViewport(next));
         }
     }
 
@@ -99,7 +100,7 @@ impl Image<'_> {
             return;
         }
         if let Some(at) = response.interact_pointer_pos().filter(|at| place.visible.contains(*at)) {
-            outbox.send(Command::Pick(Some(place.pixel(at))));
+            outbox.send(live::Command::Pick(Some(place.pixel(at))));
         }
     }
 }

@@ -4,7 +4,8 @@ use egui::{Button, RichText, Ui};
 
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::connect;
 use handeye_workbench::model::{Model, Moves};
 use handeye_workbench::tr;
 
@@ -17,7 +18,7 @@ pub fn allowance_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if model.robot.as_ref().is_some_and(|robot| robot.is_armed) {
         parts::notice_ui(ui, Tone::Warning, tr!(language, "The workbench may move this robot"), |ui| {
             if ui.button(tr!(language, "Only read it")).clicked() {
-                outbox.send(Command::Arm(false));
+                outbox.send(connect::Command::Arm(false));
             }
         });
         return;
@@ -30,7 +31,7 @@ pub fn allowance_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let palette = Palette::of(ui);
         let words = RichText::new(tr!(language, "Let the workbench move it")).color(palette.on_accent);
         if ui.add(Button::new(words).fill(palette.accent)).clicked() {
-            outbox.send(Command::Arm(true));
+            outbox.send(connect::Command::Arm(true));
         }
     });
 }

@@ -5,7 +5,8 @@ use egui::Ui;
 use crate::shell::reasons::unknown_arm;
 use crate::style::parts;
 use crate::style::theme::Tone;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::connect;
 use handeye_workbench::model::{Model, Moves, Simulation};
 use handeye_workbench::tr;
 
@@ -60,7 +61,7 @@ impl Blocked {
         let Some(reason) = self.arm.filter(|_| model.is_armed() || !model.control.is_connected()) else { return };
         parts::notice_ui(ui, Tone::Warning, reason, |ui| {
             if self.can_start && ui.button(tr!(model.view.language, "Run the simulation")).clicked() {
-                outbox.send(Command::StartSimulation);
+                outbox.send(connect::Command::StartSimulation);
             }
         });
     }

@@ -4,8 +4,9 @@
 use egui::{Button, Id, Response, RichText, Sense, Ui};
 
 use crate::style::parts;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Jog;
+use handeye_workbench::motion;
 
 /// What is held, during one frame.
 pub struct Hold {
@@ -55,16 +56,16 @@ impl Hold {
         let has_focus = ui.input(|input| input.focused);
         let now = self.now.filter(|_| has_focus);
         if let Some(jog) = now.filter(|_| self.before == now) {
-            outbox.send(Command::JogHeld(jog));
+            outbox.send(motion::Command::JogHeld(jog));
         } else {
             if self.before.is_some() {
-                outbox.send(Command::JogReleased);
+                outbox.send(motion::Command::JogReleased);
             }
             if let Some(jog) = now {
-                outbox.send(Command::Jog(jog));
+                outbox.send(motion::Command::Jog(jog));
             } else if let Some(jog) = self.tapped {
-                outbox.send(Command::Jog(jog));
-                outbox.send(Command::JogReleased);
+                outbox.send(motion::Command::Jog(jog));
+                outbox.send(motion::Command::JogReleased);
             }
         }
         if now.is_some() {

@@ -9,8 +9,9 @@ use crate::style::numbers;
 use crate::style::parts;
 use crate::style::theme::{self, Palette};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Jog, Model, Motion, MotionGoal};
+use handeye_workbench::motion;
 use handeye_workbench::tr;
 
 /// What a slider covers for a joint that turns without end \[rad\], and for one that shifts without end \[m\].
@@ -146,7 +147,7 @@ fn slider_ui(
         if is_sent {
             let place = format!("{:.1}", kind.quantity(joints[index]));
             let what = text!("joint {joint} at {place}", joint = index + 1, place = place);
-            outbox.send(Command::Move { goal: MotionGoal::Joints(joints), what });
+            outbox.send(motion::Command::Move { goal: MotionGoal::Joints(joints), what });
         }
     }
     let limits = text!(

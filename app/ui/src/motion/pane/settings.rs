@@ -7,8 +7,9 @@ use crate::style::parts;
 use crate::style::theme::{self, Palette};
 use handeye_link::limits;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{JogFrame, JogSettings, JogStep, Model, Moves};
+use handeye_workbench::motion;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
 
@@ -44,7 +45,7 @@ fn frame_ui(ui: &mut Ui, settings: JogSettings, language: Language, outbox: &mut
             let chosen = settings.frame == frame;
             let response = ui.selectable_label(chosen, frame_name(frame, language)).on_hover_text(what);
             if response.clicked() && !chosen {
-                outbox.send(Command::SetJog(JogSettings { frame, ..settings }));
+                outbox.send(motion::Command::SetJog(JogSettings { frame, ..settings }));
             }
         }
     });
@@ -68,7 +69,7 @@ fn step_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             let label = if step == JogStep::Hold { &name } else { &what };
             response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, chosen, label));
             if response.on_hover_text(&what).clicked() && !chosen {
-                outbox.send(Command::SetJog(JogSettings { step, ..settings }));
+                outbox.send(motion::Command::SetJog(JogSettings { step, ..settings }));
             }
         }
     });
@@ -83,7 +84,7 @@ fn speed_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let response = ui.add(slider);
         response.widget_info(|| WidgetInfo::slider(true, percent, tr!(language, "Speed in percent")));
         if response.changed() {
-            outbox.send(Command::SetJog(JogSettings { speed: Some(percent / 100.0), ..settings }));
+            outbox.send(motion::Command::SetJog(JogSettings { speed: Some(percent / 100.0), ..settings }));
         }
         let (said, more) = speed_said(model.moves(), percent / 100.0);
         let colour = Palette::of(ui).text;

@@ -8,9 +8,10 @@ use crate::style::numbers;
 use crate::style::parts::{self, Sign};
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Motion, Pane, RotationFormat, Severity};
 use handeye_workbench::tr;
+use handeye_workbench::{messages, motion};
 
 /// The motion with a button that ends it.
 pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -37,7 +38,7 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             let face = Face::of(ui, model, tr!(language, "Stop"));
             let stop = Button::new(RichText::new(face.words).color(face.ink)).fill(face.fill);
             if stop_button_ui(ui, stop).on_hover_text(face.hint).clicked() {
-                outbox.send(Command::Stop);
+                outbox.send(motion::Command::Stop);
             }
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 ui.add(egui::Label::new(RichText::new(what).color(palette.text)).truncate());
@@ -57,7 +58,7 @@ pub fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let width = ui.available_width() - 32.0;
         ui.allocate_ui(egui::vec2(width, 0.0), |ui| parts::notice_ui(ui, tone, &said, |_| ()));
         if parts::sign_ui(ui, Sign::Cross, close, true).clicked() {
-            outbox.send(Command::DismissMessage(message.number));
+            outbox.send(messages::Command::Dismiss(message.number));
         }
     });
 }

@@ -14,6 +14,7 @@ use handeye_workbench::model::{
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
+use handeye_workbench::{connect, messages, motion};
 
 fn driven(model: Model) -> Driven {
     Driven::new(jog_ui, model)
@@ -42,12 +43,16 @@ fn hold(pane: &mut Driven, label: &str) -> Vec<Command> {
 fn a_button_moves_from_the_press_to_the_release() {
     let mut pane = driven(sample::connected());
     let held = hold(&mut pane, "Move +X");
-    assert_eq!(held.first(), Some(&Command::Jog(forward_x())), "{held:?}");
-    assert!(held.len() >= 20 && held[1..].iter().all(|command| *command == Command::JogHeld(forward_x())), "{held:?}");
+    assert_eq!(held.first(), Some(&Command::Motion(motion::Command::Jog(forward_x()))), "{held:?}");
+    assert!(
+        held.len() >= 20
+            && held[1..].iter().all(|command| *command == Command::Motion(motion::Command::JogHeld(forward_x()))),
+        "{held:?}"
+    );
     let at = pane.harness.get_by_label("Move +X").rect().center();
     pane.harness.drop_at(at);
     pane.steps();
-    assert_eq!(pane.commands(), [Command::JogReleased]);
+    assert_eq!(pane.commands(), [Command::Motion(motion::Command::JogReleased)]);
     pane.steps();
     assert!(pane.commands().is_empty(), "nothing is held now");
 }
@@ -58,7 +63,7 @@ fn a_button_is_let_go_when_the_pointer_leaves_it_and_not_taken_up_when_it_comes_
     hold(&mut pane, "Move +X");
     pane.harness.hover_at(egui::pos2(200.0, 2.0));
     pane.steps();
-    assert_eq!(pane.commands(), [Command::JogReleased]);
+    assert_eq!(pane.commands(), [Command::Motion(motion::Command::JogReleased)]);
     let at = pane.harness.get_by_label("Move +X").rect().center();
     pane.harness.hover_at(at);
     pane.steps();
@@ -71,7 +76,7 @@ fn the_arm_is_let_go_when_the_window_loses_the_focus() {
     hold(&mut pane, "Jog joint 2 −");
     pane.harness.input_mut().focused = false;
     pane.steps();
-    assert_eq!(pane.commands(), [Command::JogReleased]);
+    assert_eq!(pane.commands(), [Command::Motion(motion::Command::JogReleased)]);
 }
 
 #[test]
@@ -80,7 +85,7 @@ fn the_arm_is_let_go_when_the_connection_is_lost() {
     hold(&mut pane, "Turn −Z");
     pane.model().mover = LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
-    assert_eq!(pane.commands(), [Command::JogReleased]);
+    assert_eq!(pane.commands(), [Command::Motion(motion::Command::JogReleased)]);
 }
 
 #[test]
@@ -92,15 +97,21 @@ fn every_direction_of_the_pad_and_every_joint_jogs_what_it_says() {
         for (sign, forward) in [("−", false), ("+", true)] {
             let frame = JogFrame::Camera;
             let sent = pane.click(&format!("Move {sign}{letter}"));
-            assert_eq!(sent.first(), Some(&Command::Jog(Jog::Translate { frame, axis, forward })));
-            assert_eq!(sent.last(), Some(&Command::JogReleased));
+            assert_eq!(
+                sent.first(),
+                Some(&Command::Motion(motion::Command::Jog(Jog::Translate { frame, axis, forward })))
+            );
+            assert_eq!(sent.last(), Some(&Command::Motion(motion::Command::JogReleased)));
             let sent = pane.click(&format!("Turn {sign}{letter}"));
-            assert_eq!(sent.first(), Some(&Command::Jog(Jog::Rotate { frame, axis, forward })));
+            assert_eq!(
+                sent.first(),
+                Some(&Command::Motion(motion::Command::Jog(Jog::Rotate { frame, axis, forward })))
+            );
         }
     }
     for index in 0..6 {
         let sent = pane.click(&format!("Jog joint {} +", index + 1));
-        assert_eq!(sent.first(), Some(&Command::Jog(Jog::Joint { index, forward: true })));
+        assert_eq!(sent.first(), Some(&Command::Motion(motion::Command::Jog(Jog::Joint { index, forward: true }))));
     }
 }
 
@@ -115,16 +126,16 @@ fn keys_jog_only_when_they_are_switched_on_and_no_field_is_edited() {
     pane.harness.key_down(Key::ArrowRight);
     pane.steps();
     let sent = pane.commands();
-    assert_eq!(sent.first(), Some(&Command::Jog(forward_x())), "{sent:?}");
-    assert!(sent.contains(&Command::JogHeld(forward_x())));
+    assert_eq!(sent.first(), Some(&Command::Motion(motion::Command::Jog(forward_x()))), "{sent:?}");
+    assert!(sent.contains(&Command::Motion(motion::Command::JogHeld(forward_x()))));
     pane.harness.key_up(Key::ArrowRight);
     pane.steps();
-    assert_eq!(pane.commands().last(), Some(&Command::JogReleased));
+    assert_eq!(pane.commands().last(), Some(&Command::Motion(motion::Command::JogReleased)));
 
     pane.harness.key_down_modifiers(Modifiers::SHIFT, Key::PageDown);
     pane.steps();
     let turn = Jog::Rotate { frame: JogFrame::Base, axis: Axis::Z, forward: false };
-    assert_eq!(pane.commands().first(), Some(&Command::Jog(turn)));
+    assert_eq!(pane.commands().first(), Some(&Command::Motion(motion::Command::Jog(turn))));
     pane.harness.key_up(Key::PageDown);
     pane.steps();
 
@@ -141,9 +152,10 @@ fn frame_step_and_speed_are_chosen() {
     let mut pane = driven(sample::connected());
     let before = pane.model().view.jog;
     let sent = pane.click("Camera");
-    assert!(matches!(sent[..], [Command::SetJog(jog)] if jog.frame == JogFrame::Camera && jog.step == before.step));
+    let [Command::Motion(motion::Command::SetJog(jog))] = sent[..] else { panic!("{sent:?}") };
+    assert!(jog.frame == JogFrame::Camera && jog.step == before.step);
     let sent = pane.click("Step 10 mm, 10°");
-    let [Command::SetJog(jog)] = sent[..] else { panic!("{sent:?}") };
+    let [Command::Motion(motion::Command::SetJog(jog))] = sent[..] else { panic!("{sent:?}") };
     assert_eq!(jog.step, JogStep::Step { metres: 0.01, radians: 10.0_f64.to_radians() });
     assert!(pane.sees("50 % · line 125 mm/s"), "no arm can be hurt in the built-in cell");
     pane.model().source = CellSource::Address("tcp://127.0.0.1:23000".to_owned());
@@ -174,7 +186,7 @@ fn numbers_follow_the_arm_until_a_person_edits_them_and_say_how_far_the_move_is(
         pane.steps();
     };
     let goal = |pane: &mut Driven| match &pane.click("Move there")[..] {
-        [Command::Move { goal: MotionGoal::Joints(joints), .. }] => joints[0].to_degrees(),
+        [Command::Motion(motion::Command::Move { goal: MotionGoal::Joints(joints), .. })] => joints[0].to_degrees(),
         other => panic!("{other:?}"),
     };
     turn(&mut pane, 101.0);
@@ -220,7 +232,9 @@ fn a_slider_moves_its_joint_when_it_is_let_go_and_not_before() {
     pane.harness.drop_at(to);
     pane.steps();
     let sent = pane.commands();
-    let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };
+    let [Command::Motion(motion::Command::Move { goal: MotionGoal::Joints(joints_rad), .. })] = &sent[..] else {
+        panic!("{sent:?}")
+    };
     assert!((1.0..6.0).contains(&joints_rad[0]), "{joints_rad:?}");
     assert_eq!(joints_rad[1..], [0.5, -1.0, 0.0, 1.5, 0.0], "the others stay");
     pane.model().now_s += 10.0;
@@ -234,7 +248,9 @@ fn numbers_are_moved_to() {
     pane.type_into("J3 of the goal", "-45");
     pane.press(Key::Enter);
     let sent = pane.click("Move there");
-    let [Command::Move { goal: MotionGoal::Joints(joints_rad), .. }] = &sent[..] else { panic!("{sent:?}") };
+    let [Command::Motion(motion::Command::Move { goal: MotionGoal::Joints(joints_rad), .. })] = &sent[..] else {
+        panic!("{sent:?}")
+    };
     assert!((joints_rad[2] + std::f64::consts::FRAC_PI_4).abs() < 1e-9, "{joints_rad:?}");
     assert!((joints_rad[0] - 0.1).abs() < 1e-4, "the rest is where the arm is");
 }
@@ -264,7 +280,9 @@ fn an_arm_has_a_row_for_each_joint_with_degrees_or_millimetres_and_a_step_and_a_
     pane.type_into("J7 of the goal", "90");
     pane.press(Key::Enter);
     let sent = pane.click("Move there");
-    let [Command::Move { goal: MotionGoal::Joints(joints), .. }] = &sent[..] else { panic!("{sent:?}") };
+    let [Command::Motion(motion::Command::Move { goal: MotionGoal::Joints(joints), .. })] = &sent[..] else {
+        panic!("{sent:?}")
+    };
     assert!((joints[0] + 0.3).abs() < 1e-12 && (joints[6] - std::f64::consts::FRAC_PI_2).abs() < 1e-9, "{joints:?}");
 }
 
@@ -306,7 +324,9 @@ fn a_typed_tip_pose_is_millimetres_and_degrees_in_the_base() {
     let mut pane = driven(model);
     pane.click("Tip pose in base");
     let sent = pane.click("Move there");
-    let [Command::Move { goal: MotionGoal::Tip(base_from_tip), .. }] = &sent[..] else { panic!("{sent:?}") };
+    let [Command::Motion(motion::Command::Move { goal: MotionGoal::Tip(base_from_tip), .. })] = &sent[..] else {
+        panic!("{sent:?}")
+    };
     let (metres, radians) = base_from_tip.distance_to(&expected);
     // Numbers are filled in to a hundredth of a millimetre and of a degree.
     assert!(metres < 1e-5 && radians < 2e-4, "{metres} m, {radians} rad");
@@ -321,7 +341,7 @@ fn a_simulation_that_rests_is_said_and_can_be_started() {
     let mut pane = driven(model);
     assert!(pane.sees("The simulation is stopped"));
     assert!(!pane.is_enabled("Move +X") && !pane.is_enabled("Jog joint 1 +") && !pane.is_enabled("Move there"));
-    assert_eq!(pane.click("Run the simulation"), [Command::StartSimulation]);
+    assert_eq!(pane.click("Run the simulation"), [Command::Connect(connect::Command::StartSimulation)]);
 }
 
 #[test]
@@ -361,9 +381,9 @@ fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
     model.messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, why, 99.0);
     let mut pane = driven(model);
     assert!(pane.sees("Moving: pose 3 (4 s)"));
-    assert_eq!(pane.click("Stop"), [Command::Stop]);
+    assert_eq!(pane.click("Stop"), [Command::Motion(motion::Command::Stop)]);
     assert!(pane.sees("Joint 2 would leave its range"));
-    assert_eq!(pane.click("Dismiss the message"), [Command::DismissMessage(0)]);
+    assert_eq!(pane.click("Dismiss the message"), [Command::Messages(messages::Command::Dismiss(0))]);
 }
 
 /// What moves the arm, as it is called.

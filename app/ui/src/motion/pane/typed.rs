@@ -10,8 +10,9 @@ use super::joints::shown_range;
 use crate::style::parts;
 use crate::style::theme::Palette;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, MotionGoal, RobotState};
+use handeye_workbench::motion;
 use handeye_workbench::motion::way::Way;
 use handeye_workbench::tr;
 
@@ -114,7 +115,7 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
         let reason = if typed.is_tip { blocked.tip } else { blocked.arm };
         if parts::gated_ui(ui, reason, Button::new(tr!(language, "Move there"))).clicked() {
             let what = if typed.is_tip { text!("typed tip pose") } else { text!("typed joint values") };
-            outbox.send(Command::Move { goal, what });
+            outbox.send(motion::Command::Move { goal, what });
             typed.is_sent = true;
         }
         let is_read = model.robot.is_some();

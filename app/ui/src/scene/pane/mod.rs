@@ -31,12 +31,13 @@ use canvas::Canvas;
 use captures::Spot;
 use eye::{Eye, Side};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::keep_out::state::with_drawn;
 use handeye_workbench::model::{Model, SceneView};
 use handeye_workbench::scene::fitted_view;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{keep_out, scene, session};
 
 /// Room above and below the controls of the line over the scene \[points\].
 const HEADER_MARGIN: f32 = 4.0;
@@ -87,13 +88,13 @@ fn header_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     };
     let what = tr!(language, "Show arm, camera and board whole; so does a double click");
     if ui.button(tr!(language, "Reset view")).on_hover_text(format!("{what}\n{hint}")).clicked() {
-        outbox.send(Command::SetSceneView(first_view(model)));
+        outbox.send(scene::Command::SetView(first_view(model)));
     }
     for side in Side::ALL {
         let (name, what) = words(side, language);
         let view = side.view(model.scene);
         if ui.selectable_label(view == model.scene, name).on_hover_text(what).clicked() && view != model.scene {
-            outbox.send(Command::SetSceneView(view));
+            outbox.send(scene::Command::SetView(view));
         }
     }
     crate::keep_out::editor::header_ui(ui, model);
@@ -162,7 +163,7 @@ fn draw_box(ui: &Ui, response: &Response, canvas: &mut Canvas, model: &Model, ou
     {
         parts::remember(ui, key, None::<[[f64; 2]; 2]>);
         if let Some(content) = with_drawn(&model.keep_out.content, from, to) {
-            outbox.send(Command::SetKeepOut(Box::new(content)));
+            outbox.send(keep_out::Command::Set(Box::new(content)));
             crate::keep_out::editor::set_drawing(ui, false);
         }
     }
@@ -193,7 +194,7 @@ fn spots_ui(
             pointed = Some(spot.id);
         }
         if response.clicked() {
-            outbox.send(Command::Select(vec![spot.id]));
+            outbox.send(session::Command::Select(vec![spot.id]));
         }
         response.on_hover_ui_at_pointer(|ui| {
             ui.label(RichText::new(&name).strong());
@@ -231,7 +232,7 @@ fn navigate(ui: &Ui, response: &Response, room: Rect, model: &Model, outbox: &mu
         next = first_view(model);
     }
     if next != now {
-        outbox.send(Command::SetSceneView(next));
+        outbox.send(scene::Command::SetView(next));
     }
 }
 

@@ -4,8 +4,10 @@ use handeye_plan::surroundings::{KeepOutBox, KeepOutFile};
 
 use super::*;
 use crate::testing::pane_harness::PaneHarness;
+use handeye_workbench::command::Command;
 use handeye_workbench::model::{CellSource, ViewSettings};
 use handeye_workbench::testing::sample;
+use handeye_workbench::{keep_out, scene, session};
 
 const VIEW: &str = "The cell in 3D";
 
@@ -34,7 +36,7 @@ fn drag(pane: &mut PaneHarness, by: Vec2, button: PointerButton, modifiers: Modi
 
 fn view(commands: &[Command]) -> SceneView {
     match commands {
-        [Command::SetSceneView(view)] => *view,
+        [Command::Scene(scene::Command::SetView(view))] => *view,
         other => panic!("{other:?}"),
     }
 }
@@ -58,12 +60,12 @@ fn the_views_from_the_sides_and_the_one_of_everything_are_a_click_away() {
     let mut pane = pane(sample::solved());
     for (label, side) in [("Top", Side::Top), ("Front", Side::Front), ("Side", Side::Right)] {
         let expected = side.view(pane.model().scene);
-        assert_eq!(pane.click(label), [Command::SetSceneView(expected)]);
+        assert_eq!(pane.click(label), [Command::Scene(scene::Command::SetView(expected))]);
     }
     pane.model().scene.distance_m = 0.3;
     pane.steps();
     let whole = fitted_view(pane.model()).expect("there is an arm");
-    assert_eq!(pane.click("Reset view"), [Command::SetSceneView(whole)]);
+    assert_eq!(pane.click("Reset view"), [Command::Scene(scene::Command::SetView(whole))]);
 }
 
 #[test]
@@ -95,7 +97,7 @@ fn the_wheel_zooms_and_a_double_click_shows_everything() {
     pane.harness.event(wheel);
     pane.steps();
     let sent = pane.commands();
-    let Some(Command::SetSceneView(nearer)) = sent.last() else { panic!("{sent:?}") };
+    let Some(Command::Scene(scene::Command::SetView(nearer))) = sent.last() else { panic!("{sent:?}") };
     assert!(nearer.distance_m < SceneView::default().distance_m);
     pane.model().scene = *nearer;
     // Until the wheel has come to rest.
@@ -113,7 +115,7 @@ fn the_wheel_zooms_and_a_double_click_shows_everything() {
     }
     pane.steps();
     let whole = fitted_view(pane.model()).expect("there is an arm");
-    assert_eq!(pane.commands().last(), Some(&Command::SetSceneView(whole)));
+    assert_eq!(pane.commands().last(), Some(&Command::Scene(scene::Command::SetView(whole))));
 }
 
 #[test]
@@ -124,7 +126,7 @@ fn a_capture_is_selected_by_a_click_on_its_frustum() {
     pane.steps();
     for row in 1..=3_u32 {
         let label = format!("Capture {row} · pose {row} in 3D");
-        assert_eq!(pane.click(&label), [Command::Select(vec![CaptureId(row)])]);
+        assert_eq!(pane.click(&label), [Command::Session(session::Command::Select(vec![CaptureId(row)]))]);
     }
 }
 
@@ -177,7 +179,9 @@ fn a_box_to_keep_out_of_is_drawn_on_the_ground_named_and_deleted() {
     pane.harness.event(press(to, false));
     pane.steps();
     let commands = pane.commands();
-    let [Command::SetKeepOut(content)] = &commands[..] else { panic!("the view is not turned by it: {commands:?}") };
+    let [Command::KeepOut(keep_out::Command::Set(content))] = &commands[..] else {
+        panic!("the view is not turned by it: {commands:?}")
+    };
     let ends = [from, to].map(|at| eye.on_ground(at).expect("seen from above"));
     let drawn = &content.boxes[0];
     for axis in 0..2 {
@@ -195,9 +199,9 @@ fn a_box_to_keep_out_of_is_drawn_on_the_ground_named_and_deleted() {
     pane.steps();
     assert!(pane.sees("Keep-out boxes: 1"));
     let deleted = pane.click("Delete box 1");
-    assert_eq!(deleted, [Command::SetKeepOut(Box::default())]);
+    assert_eq!(deleted, [Command::KeepOut(keep_out::Command::Set(Box::default()))]);
     let drags = drag(&mut pane, vec2(-30.0, 10.0), PointerButton::Secondary, Modifiers::NONE);
-    assert!(matches!(drags[..], [Command::SetSceneView(_)]), "one box is one drag: {drags:?}");
+    assert!(matches!(drags[..], [Command::Scene(scene::Command::SetView(_))]), "one box is one drag: {drags:?}");
 }
 
 /// A file may say more than a field shows.

@@ -11,9 +11,10 @@ use egui::{Align, Button, Context, Id, Key, Layout, Modifiers, RichText, TextEdi
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use crate::typed::MOST_TYPED;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Dialog, FolderEntry, FolderKind, Model, Severity};
 use handeye_workbench::tr;
+use handeye_workbench::{session, shell};
 use purpose::Purpose;
 
 /// What the dialog remembers while it is open.
@@ -55,7 +56,7 @@ pub fn folders_ui(ui: &mut Ui, model: &Model, dialog: Dialog, outbox: &mut Outbo
     let is_new = state.dialog != Some(dialog);
     if is_new {
         state = State { dialog: Some(dialog), typed: purpose.first_path(model), ..State::default() };
-        outbox.send(Command::ListFolder(purpose::first_folder(model)));
+        outbox.send(session::Command::ListFolder(purpose::first_folder(model)));
     }
     keys(ui, model, &purpose, &mut state, outbox);
     ui.label(RichText::new(purpose.title).size(16.0).color(Palette::of(ui).text));
@@ -125,7 +126,7 @@ fn activate(model: &Model, purpose: &Purpose, state: &mut State, entry: &FolderE
 fn go(purpose: &Purpose, state: &mut State, folder: PathBuf, outbox: &mut Outbox) {
     (state.selected, state.is_chosen) = (None, false);
     state.typed = purpose.path_in(&folder, &state.typed);
-    outbox.send(Command::ListFolder(folder));
+    outbox.send(session::Command::ListFolder(folder));
 }
 
 /// Does what the dialog is for.
@@ -135,7 +136,7 @@ fn act(model: &Model, purpose: &Purpose, state: &mut State, outbox: &mut Outbox)
     if purpose.is_awaited() {
         state.asked = Some(Asked { before: model.messages.newest().map(|message| message.number), frames: 0 });
     } else {
-        outbox.send(Command::SetDialog(None));
+        outbox.send(shell::Command::SetDialog(None));
     }
 }
 
@@ -148,7 +149,7 @@ fn follow(model: &Model, state: &mut State, outbox: &mut Outbox) {
         return;
     }
     if trouble(model, state).is_none() {
-        outbox.send(Command::SetDialog(None));
+        outbox.send(shell::Command::SetDialog(None));
         state.asked = None;
     }
 }
@@ -208,7 +209,7 @@ fn buttons_ui(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, 
             act(model, purpose, state, outbox);
         }
         if ui.button(tr!(language, "Cancel")).clicked() {
-            outbox.send(Command::SetDialog(None));
+            outbox.send(shell::Command::SetDialog(None));
         }
     });
 }

@@ -6,6 +6,7 @@ use handeye_workbench::command::Command;
 use handeye_workbench::model::{Dialog, Model, exports_of};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{export, keep_out, session, taught};
 
 /// Name of a new file of poses.
 const POSES_FILE: &str = "poses.toml";
@@ -140,21 +141,25 @@ impl Purpose {
     pub fn command(&self, typed: &str) -> Option<Command> {
         let path = PathBuf::from(typed);
         if typed.is_empty() {
-            return (self.dialog == Dialog::New).then_some(Command::NewSession(None));
+            return (self.dialog == Dialog::New).then_some(session::Command::New(None).into());
         }
         let is_file = path.extension().is_some_and(|extension| extension == "toml");
         match self.dialog {
-            Dialog::Open => Some(Command::Open(path)),
-            Dialog::SaveAs => Some(Command::SaveAs(path)),
-            Dialog::New => Some(Command::NewSession(Some(path))),
-            Dialog::ImportPoses => is_file.then_some(Command::ImportTaught(path)),
+            Dialog::Open => Some(session::Command::Open(path).into()),
+            Dialog::SaveAs => Some(session::Command::SaveAs(path).into()),
+            Dialog::New => Some(session::Command::New(Some(path)).into()),
+            Dialog::ImportPoses => is_file.then_some(taught::Command::Import(path).into()),
             Dialog::ExportPoses | Dialog::ExportKeepOut => {
                 let named = if is_file { path } else { PathBuf::from(format!("{typed}.toml")) };
                 let is_poses = self.dialog == Dialog::ExportPoses;
-                Some(if is_poses { Command::ExportTaught(named) } else { Command::ExportKeepOut(named) })
+                Some(if is_poses {
+                    taught::Command::Export(named).into()
+                } else {
+                    keep_out::Command::Export(named).into()
+                })
             }
-            Dialog::ImportKeepOut => is_file.then_some(Command::ImportKeepOut(path)),
-            Dialog::ExportFolder => Some(Command::SetExportFolder(Some(path))),
+            Dialog::ImportKeepOut => is_file.then_some(keep_out::Command::Import(path).into()),
+            Dialog::ExportFolder => Some(export::Command::SetFolder(Some(path)).into()),
             Dialog::Help | Dialog::Palette | Dialog::About | Dialog::RerunAddress | Dialog::Import => None,
         }
     }

@@ -11,10 +11,11 @@ use crate::capture::rows::{CaptureRow, CaptureTable};
 use crate::style::marks::{self, Marks};
 use crate::style::theme::{CAPTION, Palette};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{session, solve};
 
 /// The line is first drawn at so many times the median residual.
 const FIRST_LINE: f64 = 2.0;
@@ -85,7 +86,7 @@ fn controls_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         let what = tr!(language, "A line between good and bad residuals, which you drag up and down");
         if ui.checkbox(&mut on, tr!(language, "Outlier line")).on_hover_text(what).changed() {
             let line = if on { first_line_px(table) } else { None };
-            outbox.send(Command::SetOutlierLine(line));
+            outbox.send(solve::Command::SetOutlierLine(line));
         }
         let Some(line_px) = model.outlier_line_px else { return };
         let ids = above(table, line_px);
@@ -101,7 +102,7 @@ fn controls_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         let none = tr!(language, "No capture of the fit is above the line");
         let button = ui.add_enabled(!ids.is_empty(), egui::Button::new(words));
         if button.on_hover_text(what.say(language)).on_disabled_hover_text(none).clicked() {
-            outbox.send(Command::SetExcluded { ids, excluded: true });
+            outbox.send(session::Command::SetExcluded { ids, excluded: true });
         }
     });
 }
@@ -149,7 +150,7 @@ impl Bars {
         if response.clicked()
             && let Some((_, row)) = response.interact_pointer_pos().and_then(index_at)
         {
-            outbox.send(Command::Select(vec![row.id]));
+            outbox.send(session::Command::Select(vec![row.id]));
         }
         if let Some((_, row)) = pointed {
             let words = self.words(row, language);
@@ -200,7 +201,7 @@ fn line_ui(ui: &mut Ui, plot: Rect, scale: Scale, line_px: f64, language: Langua
         let part = f64::from((plot.bottom() - at.y) / plot.height()).clamp(0.0, 1.1);
         let next = scale.value(part);
         if (next - line_px).abs() > f64::EPSILON {
-            outbox.send(Command::SetOutlierLine(Some(next)));
+            outbox.send(solve::Command::SetOutlierLine(Some(next)));
         }
     }
 }

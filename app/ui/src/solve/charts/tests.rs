@@ -6,6 +6,7 @@ use super::*;
 use crate::testing::pane_harness::{PaneHarness, PaneState};
 use handeye_workbench::command::Command;
 use handeye_workbench::testing::sample;
+use handeye_workbench::{session, solve};
 
 fn pane(model: Model) -> PaneHarness {
     PaneHarness::new(model, vec2(640.0, 400.0), |ui, state| {
@@ -30,7 +31,9 @@ fn what_is_above_the_line_is_excluded_and_nothing_else() {
     let (line_px, above) = (all[7].0, [all[8].1, all[9].1]);
     model.outlier_line_px = Some(line_px);
     let mut pane = pane(model);
-    let [Command::SetExcluded { ids, excluded: true }] = &pane.click("Exclude 2 above the line")[..] else {
+    let [Command::Session(session::Command::SetExcluded { ids, excluded: true })] =
+        &pane.click("Exclude 2 above the line")[..]
+    else {
         panic!("another command")
     };
     assert_eq!(ids.len(), 2);
@@ -43,7 +46,7 @@ fn the_line_is_switched_on_above_good_residuals_and_dragged() {
     let all = residuals(&model);
     let mut pane = pane(model);
     let sent = pane.click("Outlier line");
-    let [Command::SetOutlierLine(Some(line_px))] = sent[..] else { panic!("{sent:?}") };
+    let [Command::Solve(solve::Command::SetOutlierLine(Some(line_px)))] = sent[..] else { panic!("{sent:?}") };
     assert!(line_px > all[9].0, "nothing of a good session is above the first line");
     pane.model().outlier_line_px = Some(line_px);
     pane.steps();
@@ -53,13 +56,13 @@ fn the_line_is_switched_on_above_good_residuals_and_dragged() {
     pane.harness.hover_at(line.center() + vec2(0.0, 60.0));
     pane.steps();
     let lower = pane.commands().into_iter().rev().find_map(|command| match command {
-        Command::SetOutlierLine(Some(line_px)) => Some(line_px),
+        Command::Solve(solve::Command::SetOutlierLine(Some(line_px))) => Some(line_px),
         _ => None,
     });
     assert!(lower.is_some_and(|lower| lower > 0.0 && lower < line_px), "{lower:?}");
     pane.harness.drop_at(line.center());
     pane.steps();
-    assert_eq!(pane.click("Outlier line"), [Command::SetOutlierLine(None)]);
+    assert_eq!(pane.click("Outlier line"), [Command::Solve(solve::Command::SetOutlierLine(None))]);
 }
 
 #[test]
@@ -76,7 +79,7 @@ fn a_click_on_a_bar_selects_its_capture() {
     pane.harness.drag_at(at);
     pane.harness.drop_at(at);
     pane.steps();
-    assert_eq!(pane.commands(), [Command::Select(vec![CaptureId(5)])]);
+    assert_eq!(pane.commands(), [Command::Session(session::Command::Select(vec![CaptureId(5)]))]);
 }
 
 #[test]

@@ -4,9 +4,10 @@ use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichTex
 
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Solved};
 use handeye_workbench::report::in_parts;
+use handeye_workbench::solve;
 use handeye_workbench::tr;
 
 /// Size of the number.
@@ -82,6 +83,6 @@ fn goal_ui(ui: &mut Ui, model: &Model, goal_mm: f64, outbox: &mut Outbox) {
     let response = ui.add(field).on_hover_text(tr!(language, "The error that is good enough for what you do"));
     let name = ui.label(RichText::new(tr!(language, "Goal")).color(Palette::of(ui).weak));
     if response.labelled_by(name.id).changed() {
-        outbox.send(Command::SetGoal(goal_mm * 1e-3));
+        outbox.send(solve::Command::SetGoal(goal_mm * 1e-3));
     }
 }

@@ -6,8 +6,9 @@ use handeye_geometry::frames::{Camera, Mount, Pose};
 
 use crate::style::parts;
 use crate::style::theme::Palette;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Solved};
+use handeye_workbench::solve;
 use handeye_workbench::text::{Language, Text};
 use handeye_workbench::tr;
 
@@ -32,7 +33,7 @@ pub fn methods_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outb
         ui.end_row();
         for name in Method::names() {
             if ui.radio(model.method == name, title(name, language)).clicked() && model.method != name {
-                outbox.send(Command::SetMethod(name.to_owned()));
+                outbox.send(solve::Command::SetMethod(name.to_owned()));
             }
             row_ui(ui, name, answer.as_ref(), solved, language);
             ui.end_row();
@@ -50,7 +51,7 @@ fn keep_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
          that you see the difference; it may then be much worse than it says"
     );
     if ui.checkbox(&mut keep, tr!(language, "Keep all views")).on_hover_text(what).changed() {
-        outbox.send(Command::SetKeepOutliers(keep));
+        outbox.send(solve::Command::SetKeepOutliers(keep));
     }
 }
 

@@ -7,8 +7,9 @@ use handeye_geometry::progress::Stage;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, SolveStatus};
+use handeye_workbench::solve;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -35,7 +36,7 @@ fn running_ui(ui: &mut Ui, model: &Model, stage: Stage, part: f64, since_s: f64,
     let doing = stage_name(stage, language);
     let text = text!("Solving for {seconds} s: {doing}", seconds = seconds, doing = doing).say(language);
     if parts::progress_ui(ui, part as f32, &text, tr!(language, "Cancel solving")) {
-        outbox.send(Command::CancelSolve);
+        outbox.send(solve::Command::Cancel);
     }
     if model.solve.solved.is_some() && !model.solve.fresh {
         parts::hint_ui(ui, tr!(language, "The numbers below are of the earlier captures until it is done."));
@@ -68,7 +69,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 }
             });
             if parts::gated_ui(ui, reason, Button::new(tr!(language, "Solve"))).clicked() {
-                outbox.send(Command::Solve);
+                outbox.send(solve::Command::Solve);
             }
         });
         return;
@@ -83,7 +84,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             let weak = Palette::of(ui).weak;
             ui.label(RichText::new(how.say(language)).color(weak));
             if ui.button(tr!(language, "Solve again")).clicked() {
-                outbox.send(Command::Solve);
+                outbox.send(solve::Command::Solve);
             }
         });
     } else {
@@ -94,7 +95,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 
 fn again_ui(ui: &mut Ui, language: Language, outbox: &mut Outbox) {
     if ui.button(tr!(language, "Solve again")).clicked() {
-        outbox.send(Command::Solve);
+        outbox.send(solve::Command::Solve);
     }
 }
 

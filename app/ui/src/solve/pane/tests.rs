@@ -17,6 +17,7 @@ use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{Goal, JobId, SolveStatus};
 use handeye_workbench::session::start::BOARD;
+use handeye_workbench::solve;
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
 
@@ -33,7 +34,7 @@ fn without_an_answer_it_says_what_is_missing() {
     *pane.model() = sample::captured();
     pane.steps();
     assert!(pane.sees("Captures so far: 10."));
-    assert_eq!(pane.click("Solve"), [Command::Solve]);
+    assert_eq!(pane.click("Solve"), [Command::Solve(solve::Command::Solve)]);
 }
 
 #[test]
@@ -80,7 +81,10 @@ fn the_goal_is_typed_in_millimetres_and_sent_in_metres() {
     pane.type_into("Goal", "0.25");
     let sent = pane.press(egui::Key::Enter);
     let last = sent.last().expect("a command");
-    assert!(matches!(last, Command::SetGoal(metres) if (metres - 0.25e-3).abs() < 1e-12), "{sent:?}");
+    assert!(
+        matches!(last, Command::Solve(solve::Command::SetGoal(metres)) if (metres - 0.25e-3).abs() < 1e-12),
+        "{sent:?}"
+    );
 }
 
 #[test]
@@ -121,7 +125,7 @@ fn a_solve_shows_its_stage_and_can_be_cancelled() {
     let mut pane = driven(model);
     assert!(pane.sees("Solving for 3 s: predicting held-out views"));
     assert!(pane.nothing_is_cut_off());
-    assert_eq!(pane.click("Cancel solving"), [Command::CancelSolve]);
+    assert_eq!(pane.click("Cancel solving"), [Command::Solve(solve::Command::Cancel)]);
 }
 
 #[test]
@@ -130,7 +134,7 @@ fn a_failed_solve_says_why_and_can_be_tried_again() {
     model.solve.status = SolveStatus::Failed { why: Text::verbatim("Turn the tip by 30° or more.") };
     let mut pane = driven(model);
     assert!(pane.sees("Turn the tip by 30° or more."));
-    assert_eq!(pane.click("Solve again"), [Command::Solve]);
+    assert_eq!(pane.click("Solve again"), [Command::Solve(solve::Command::Solve)]);
 }
 
 #[test]
@@ -139,7 +143,7 @@ fn an_answer_of_earlier_captures_is_marked() {
     model.solve.fresh = false;
     let mut pane = driven(model);
     assert!(pane.sees("Out of date"));
-    assert_eq!(pane.click("Solve again"), [Command::Solve]);
+    assert_eq!(pane.click("Solve again"), [Command::Solve(solve::Command::Solve)]);
 }
 
 #[test]
@@ -151,7 +155,7 @@ fn another_method_is_chosen_from_the_comparison() {
     });
     let mut pane = driven(model);
     assert!(pane.sees("no answer"));
-    assert_eq!(pane.click("Park & Martin"), [Command::SetMethod("park_martin".to_owned())]);
+    assert_eq!(pane.click("Park & Martin"), [Command::Solve(solve::Command::SetMethod("park_martin".to_owned()))]);
     assert!(pane.click("Joint estimate").is_empty(), "it is chosen already");
 }
 
@@ -159,10 +163,10 @@ fn another_method_is_chosen_from_the_comparison() {
 fn keeping_all_views_is_one_click() {
     let mut pane = driven(sample::with_an_outlier());
     assert!(pane.sees("Outlier views: 1 of 10"));
-    assert_eq!(pane.click("Keep all views"), [Command::SetKeepOutliers(true)]);
+    assert_eq!(pane.click("Keep all views"), [Command::Solve(solve::Command::SetKeepOutliers(true))]);
     pane.model().keep_outliers = true;
     pane.steps();
-    assert_eq!(pane.click("Keep all views"), [Command::SetKeepOutliers(false)]);
+    assert_eq!(pane.click("Keep all views"), [Command::Solve(solve::Command::SetKeepOutliers(false))]);
 }
 
 /// What the estimate found out, all of it.

@@ -5,8 +5,9 @@ use egui::{DragValue, Grid, RichText, Ui, WidgetInfo, WidgetType};
 use crate::style::parts;
 use crate::style::theme::Palette;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::solve;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -23,7 +24,7 @@ pub fn workspace_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if model.tip_box.chosen.is_some()
             && ui.add(parts::small_button(ui, tr!(language, "Box about the board"))).clicked()
         {
-            outbox.send(Command::SetTipBox(None));
+            outbox.send(solve::Command::SetTipBox(None));
         }
     });
     let what = tr!(
@@ -40,7 +41,7 @@ pub fn workspace_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
     });
     if wanted != work_box {
-        outbox.send(Command::SetTipBox(Some(wanted)));
+        outbox.send(solve::Command::SetTipBox(Some(wanted)));
     }
     stated_ui(ui, tr!(language, "Worst, 95 %"), error.worst_m, language).on_hover_text(
         text!("At {place} mm in the base", place = place_mm(error.worst_at.coords.into())).say(language),
@@ -86,6 +87,7 @@ fn place_mm(place_m: [f64; 3]) -> String {
 mod tests {
     use super::*;
     use crate::testing::driven::Driven;
+    use handeye_workbench::command::Command;
     use handeye_workbench::model::{self, BoxState, WorkBox};
     use handeye_workbench::testing::sample;
 
@@ -111,7 +113,7 @@ mod tests {
         pane.type_into("Box to z", "250");
         let sent = pane.press(egui::Key::Enter);
         let last = sent.last().expect("a command");
-        let Command::SetTipBox(Some(wanted)) = last else { panic!("{sent:?}") };
+        let Command::Solve(solve::Command::SetTipBox(Some(wanted))) = last else { panic!("{sent:?}") };
         assert!((wanted.to_m[2] - 0.25).abs() < 1e-9, "{wanted:?}");
         assert_eq!(wanted.from_m, [0.3, 0.0, 0.0], "the other corner stays");
         assert!(pane.nothing_is_cut_off());
@@ -120,7 +122,7 @@ mod tests {
     #[test]
     fn the_box_goes_back_to_the_board_and_is_not_there_without_uncertainty() {
         let mut pane = pane(with_box());
-        assert_eq!(pane.click("Box about the board"), [Command::SetTipBox(None)]);
+        assert_eq!(pane.click("Box about the board"), [Command::Solve(solve::Command::SetTipBox(None))]);
         pane.model().tip_box = BoxState::default();
         pane.steps();
         assert!(!pane.sees("Expected error over a box"));

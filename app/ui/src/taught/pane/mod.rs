@@ -9,8 +9,9 @@ use crate::shell::sequence::sequence_ui;
 use crate::style::parts;
 use crate::style::theme::Tone;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::taught;
 use handeye_workbench::tr;
 
 /// The pane.
@@ -62,7 +63,7 @@ fn elsewhere_ui(ui: &mut Ui, model: &Model, here: usize, outbox: &mut Outbox) {
         let reason = model.sequence_runs.then(|| tr!(language, "A sequence is under way"));
         let button = parts::small_button(ui, tr!(language, "Use them here"));
         if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
-            outbox.send(Command::AdoptTaught);
+            outbox.send(taught::Command::Adopt);
         }
     });
 }

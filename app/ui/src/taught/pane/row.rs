@@ -9,8 +9,9 @@ use crate::style::numbers;
 use crate::style::parts::{self, Sign};
 use crate::style::theme::Palette;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, StopOutcome};
+use handeye_workbench::taught;
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
 
@@ -48,15 +49,15 @@ pub fn row_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, p
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let remove = text!("Remove {name}", name = name).say(language);
             if parts::sign_ui(ui, Sign::Cross, &remove, is_free).clicked() {
-                outbox.send(Command::RemoveTaught(name.clone()));
+                outbox.send(taught::Command::Remove(name.clone()));
             }
             let later = text!("Move {name} down", name = name).say(language);
             if parts::sign_ui(ui, Sign::Down, &later, is_free && index + 1 < count).clicked() {
-                outbox.send(Command::ReorderTaught { name: name.clone(), to: index + 1 });
+                outbox.send(taught::Command::Reorder { name: name.clone(), to: index + 1 });
             }
             let earlier = text!("Move {name} up", name = name).say(language);
             if parts::sign_ui(ui, Sign::Up, &earlier, is_free && index > 0).clicked() {
-                outbox.send(Command::ReorderTaught { name: name.clone(), to: index.saturating_sub(1) });
+                outbox.send(taught::Command::Reorder { name: name.clone(), to: index.saturating_sub(1) });
             }
             let button = parts::small_button(ui, tr!(language, "Go to"));
             let go = parts::gated_ui(ui, immovable(model), button);
@@ -64,7 +65,7 @@ pub fn row_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, p
             let can_go = immovable(model).is_none();
             go.widget_info(|| WidgetInfo::labeled(WidgetType::Button, can_go, &go_name));
             if go.clicked() {
-                outbox.send(Command::GoToTaught(name.clone()));
+                outbox.send(taught::Command::GoTo(name.clone()));
             }
             kind_ui(ui, pose, model);
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| name_ui(ui, model, poses, index, pose, outbox));
@@ -147,7 +148,7 @@ fn name_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose
         let to = shown.trim();
         let is_kept = !taken && !to.is_empty() && to != pose.name && !ui.input(|input| input.key_pressed(Key::Escape));
         if is_kept {
-            outbox.send(Command::RenameTaught { from: pose.name.clone(), to: to.to_owned() });
+            outbox.send(taught::Command::Rename { from: pose.name.clone(), to: to.to_owned() });
         }
         parts::remember(ui, id, None::<Renaming>);
     }
@@ -168,6 +169,6 @@ fn drop_ui(ui: &mut Ui, poses: &[&TaughtPose], index: usize, row: Rect, outbox: 
     // Its own place is free once it is taken out.
     let to = if gap > dragged.0 { gap - 1 } else { gap };
     if let Some(pose) = poses.get(dragged.0).filter(|_| to != dragged.0) {
-        outbox.send(Command::ReorderTaught { name: pose.name.clone(), to });
+        outbox.send(taught::Command::Reorder { name: pose.name.clone(), to });
     }
 }

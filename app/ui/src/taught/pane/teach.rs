@@ -3,9 +3,10 @@
 use egui::{Button, Id, Key, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use crate::style::parts;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Dialog, Model};
 use handeye_workbench::tr;
+use handeye_workbench::{shell, taught};
 
 /// The two rows.
 pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
@@ -31,7 +32,7 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let clicked = parts::gated_ui(ui, reason, Button::new(tr!(language, "Teach here"))).clicked();
         if (clicked || entered) && reason.is_none() {
             let trimmed = name.trim();
-            outbox.send(Command::Teach { name: (!trimmed.is_empty()).then(|| trimmed.to_owned()) });
+            outbox.send(taught::Command::Teach { name: (!trimmed.is_empty()).then(|| trimmed.to_owned()) });
             name.clear();
         }
     });
@@ -43,11 +44,11 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let reason = model.cell.is_none().then(|| tr!(language, "Not connected: taught poses belong to an arm"));
         let import = parts::gated_ui(ui, reason, Button::new(tr!(language, "Import…")));
         if import.on_hover_text(tr!(language, "Add poses from a file")).clicked() {
-            outbox.send(Command::SetDialog(Some(Dialog::ImportPoses)));
+            outbox.send(shell::Command::SetDialog(Some(Dialog::ImportPoses)));
         }
         let is_empty = model.taught().is_empty();
         if ui.add_enabled(!is_empty, Button::new(tr!(language, "Export…"))).clicked() {
-            outbox.send(Command::SetDialog(Some(Dialog::ExportPoses)));
+            outbox.send(shell::Command::SetDialog(Some(Dialog::ExportPoses)));
         }
         let what = tr!(language, "Ten poses around the board, instead of those in the list. Undo brings them back");
         let reason = if model.has_reference_poses() {
@@ -60,7 +61,7 @@ pub fn teach_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         };
         let button = Button::new(tr!(language, "Reference poses"));
         if parts::gated_ui(ui, reason, button).on_hover_text(what).clicked() {
-            outbox.send(Command::TeachReference);
+            outbox.send(taught::Command::TeachReference);
         }
     });
     parts::remember(ui, id, name);

@@ -11,6 +11,7 @@ use handeye_workbench::command::Command;
 use handeye_workbench::model::{CapturePurpose, Dialog, LinkState, PoseSequence, StopOutcome};
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
+use handeye_workbench::{shell, taught};
 
 /// Three poses: one of joints, two of the tip.
 fn model() -> Model {
@@ -38,16 +39,16 @@ fn without_poses_it_says_how_to_get_some() {
     let mut pane = driven(sample::connected());
     assert!(pane.sees("No taught poses yet"));
     assert!(!pane.is_enabled("Capture at each"));
-    assert_eq!(pane.click("Reference poses"), [Command::TeachReference]);
-    assert_eq!(pane.click("Teach here"), [Command::Teach { name: None }]);
-    assert_eq!(pane.click("Import…"), [Command::SetDialog(Some(Dialog::ImportPoses))]);
+    assert_eq!(pane.click("Reference poses"), [Command::Taught(taught::Command::TeachReference)]);
+    assert_eq!(pane.click("Teach here"), [Command::Taught(taught::Command::Teach { name: None })]);
+    assert_eq!(pane.click("Import…"), [Command::Shell(shell::Command::SetDialog(Some(Dialog::ImportPoses)))]);
 }
 
 #[test]
 fn a_pose_is_taught_under_the_name_that_was_typed() {
     let mut pane = driven(model());
     pane.type_into("Name of the new pose", "above");
-    assert_eq!(pane.click("Teach here"), [Command::Teach { name: Some("above".to_owned()) }]);
+    assert_eq!(pane.click("Teach here"), [Command::Taught(taught::Command::Teach { name: Some("above".to_owned()) })]);
     pane.type_into("Name of the new pose", "left");
     assert!(!pane.is_enabled("Teach here"), "that name is taken");
 }
@@ -57,7 +58,10 @@ fn a_pose_is_renamed_where_it_stands() {
     let mut pane = driven(model());
     pane.type_into("Name of pose 2", " side");
     let sent = pane.press(Key::Enter);
-    assert_eq!(sent, [Command::RenameTaught { from: "left".to_owned(), to: "left side".to_owned() }]);
+    assert_eq!(
+        sent,
+        [Command::Taught(taught::Command::Rename { from: "left".to_owned(), to: "left side".to_owned() })]
+    );
     pane.type_into("Name of pose 2", "er");
     assert!(pane.press(Key::Escape).is_empty(), "Esc leaves the name as it is");
 }
@@ -74,10 +78,16 @@ fn a_name_that_is_taken_is_not_given_twice() {
 #[test]
 fn poses_are_visited_removed_and_put_elsewhere() {
     let mut pane = driven(model());
-    assert_eq!(pane.click("Go to right"), [Command::GoToTaught("right".to_owned())]);
-    assert_eq!(pane.click("Remove front"), [Command::RemoveTaught("front".to_owned())]);
-    assert_eq!(pane.click("Move right up"), [Command::ReorderTaught { name: "right".to_owned(), to: 1 }]);
-    assert_eq!(pane.click("Move front down"), [Command::ReorderTaught { name: "front".to_owned(), to: 1 }]);
+    assert_eq!(pane.click("Go to right"), [Command::Taught(taught::Command::GoTo("right".to_owned()))]);
+    assert_eq!(pane.click("Remove front"), [Command::Taught(taught::Command::Remove("front".to_owned()))]);
+    assert_eq!(
+        pane.click("Move right up"),
+        [Command::Taught(taught::Command::Reorder { name: "right".to_owned(), to: 1 })]
+    );
+    assert_eq!(
+        pane.click("Move front down"),
+        [Command::Taught(taught::Command::Reorder { name: "front".to_owned(), to: 1 })]
+    );
     assert!(!pane.is_enabled("Move front up") && !pane.is_enabled("Move right down"));
 }
 
@@ -96,16 +106,19 @@ fn a_pose_is_dragged_to_the_place_below_another() {
     assert!(pane.commands().is_empty());
     pane.harness.drop_at(to);
     pane.steps();
-    assert_eq!(pane.commands(), [Command::ReorderTaught { name: "front".to_owned(), to: 2 }]);
+    assert_eq!(pane.commands(), [Command::Taught(taught::Command::Reorder { name: "front".to_owned(), to: 2 })]);
 }
 
 #[test]
 fn all_poses_are_run_for_each_purpose() {
     let mut pane = driven(model());
-    let calibrate = Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) };
+    let calibrate = Command::Taught(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     assert_eq!(pane.click("Capture at each"), [calibrate]);
-    assert_eq!(pane.click("Verify at each"), [Command::RunSequence { purpose: Some(CapturePurpose::Verify) }]);
-    assert_eq!(pane.click("Move only"), [Command::RunSequence { purpose: None }]);
+    assert_eq!(
+        pane.click("Verify at each"),
+        [Command::Taught(taught::Command::RunSequence { purpose: Some(CapturePurpose::Verify) })]
+    );
+    assert_eq!(pane.click("Move only"), [Command::Taught(taught::Command::RunSequence { purpose: None })]);
     pane.model().mover = LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
     assert!(!pane.is_enabled("Capture at each") && !pane.is_enabled("Go to front"));
@@ -118,7 +131,7 @@ fn a_session_of_images_is_moved_through_and_captures_nothing() {
     Arc::make_mut(&mut images.session.document).captures.clone_from(&of_images.document().captures);
     let mut pane = driven(images);
     assert!(!pane.is_enabled("Capture at each") && !pane.is_enabled("Verify at each"));
-    assert_eq!(pane.click("Move only"), [Command::RunSequence { purpose: None }]);
+    assert_eq!(pane.click("Move only"), [Command::Taught(taught::Command::RunSequence { purpose: None })]);
 }
 
 #[test]
@@ -137,11 +150,11 @@ fn a_sequence_says_how_each_pose_went_and_can_be_stopped() {
     assert!(pane.sees("Pose 3 of 3: right"));
     assert!(pane.sees("Skipped: the board was not found"));
     assert!(!pane.is_enabled("Remove front"));
-    assert_eq!(pane.click("Stop the sequence"), [Command::StopSequence]);
+    assert_eq!(pane.click("Stop the sequence"), [Command::Taught(taught::Command::StopSequence)]);
     pane.model().sequence_runs = false;
     pane.steps();
     assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
-    assert_eq!(pane.click("Continue the sequence"), [Command::ContinueSequence]);
+    assert_eq!(pane.click("Continue the sequence"), [Command::Taught(taught::Command::ContinueSequence)]);
     let sequence = pane.model().sequence.as_mut().expect("it is still known");
     sequence.outcomes.push(StopOutcome::Done);
     pane.steps();

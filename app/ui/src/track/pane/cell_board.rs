@@ -5,10 +5,11 @@ use egui::{DragValue, RichText, Ui, WidgetInfo, WidgetType};
 use super::blocked::Blocked;
 use crate::style::theme::Palette;
 use crate::style::{form, parts};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{BoardMotion, BoardPath, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::track;
 
 /// The first speed that is asked for [m/s]: about as fast as a slow conveyor.
 const FIRST_SPEED_M_S: f64 = 0.05;
@@ -30,7 +31,7 @@ pub fn board_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
             (path, name, what)
         });
         if let Some(path) = form::choice_ui(ui, motion.path, &choices) {
-            outbox.send(Command::MoveBoard(BoardMotion { path, speed_m_s }));
+            outbox.send(track::Command::MoveBoard(BoardMotion { path, speed_m_s }));
         }
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new(tr!(language, "Speed")).color(Palette::of(ui).weak));
@@ -45,12 +46,12 @@ pub fn board_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
                 ..WidgetInfo::labeled(WidgetType::DragValue, is_enabled, tr!(language, "Speed of the board in m/s"))
             });
             if response.changed() {
-                outbox.send(Command::MoveBoard(BoardMotion { path: motion.path, speed_m_s: next_m_s }));
+                outbox.send(track::Command::MoveBoard(BoardMotion { path: motion.path, speed_m_s: next_m_s }));
             }
             let mut hidden = model.track.board_hidden;
             let what = tr!(language, "Hide the board for a while, to see tracking coast, lose it and find it again");
             if ui.checkbox(&mut hidden, tr!(language, "Hide the board")).on_hover_text(what).changed() {
-                outbox.send(Command::HideBoard(hidden));
+                outbox.send(track::Command::HideBoard(hidden));
             }
         });
     });

@@ -6,10 +6,11 @@ use super::blocked::{Blocked, is_following};
 use crate::style::theme::{Palette, Tone};
 use crate::style::{form, parts};
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{FollowStatus, FollowWish, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::track;
 
 /// Distances of the tip from a corner that can be asked for [mm]: nearer, the arm touches the board.
 const STAND_OFFS_MM: std::ops::RangeInclusive<f64> = 20.0..=600.0;
@@ -56,12 +57,12 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
         if follows {
             let what = tr!(language, "The arm comes to rest; STOP does the same at once");
             if ui.button(tr!(language, "Stop following")).on_hover_text(what).clicked() {
-                outbox.send(Command::SetFollow(None));
+                outbox.send(track::Command::SetFollow(None));
             }
         } else {
             let button = Button::new(tr!(language, "Follow"));
             if parts::gated_ui(ui, blocked.follow, button).clicked() {
-                outbox.send(Command::SetFollow(Some(choice.wish())));
+                outbox.send(track::Command::SetFollow(Some(choice.wish())));
             }
         }
         status_ui(ui, model, follows);
@@ -78,7 +79,7 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
                 .clicked()
         });
         if again {
-            outbox.send(Command::SetFollow(Some(choice.wish())));
+            outbox.send(track::Command::SetFollow(Some(choice.wish())));
         }
     }
 }

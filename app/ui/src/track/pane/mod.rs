@@ -12,9 +12,10 @@ use egui::{Ui, Vec2};
 use crate::style::parts;
 use crate::style::theme::Tone;
 pub use blocked::Blocked;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Moves};
 use handeye_workbench::tr;
+use handeye_workbench::track;
 
 /// What stands beside the numbers has at least this width: its buttons and plots need it.
 const LEAST_BESIDE: f32 = 300.0;
@@ -68,13 +69,13 @@ fn tracking_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outbo
     ui.horizontal_wrapped(|ui| {
         if model.track.on {
             if ui.button(tr!(language, "Stop tracking")).clicked() {
-                outbox.send(Command::SetTracking(false));
+                outbox.send(track::Command::SetTracking(false));
             }
         } else {
             let button = egui::Button::new(tr!(language, "Start tracking"));
             let what = tr!(language, "Look for the board in every image and tell where it is in the base");
             if parts::gated_ui(ui, blocked.tracking, button).on_hover_text(what).clicked() {
-                outbox.send(Command::SetTracking(true));
+                outbox.send(track::Command::SetTracking(true));
             }
         }
         state::state_ui(ui, model);

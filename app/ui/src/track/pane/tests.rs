@@ -7,12 +7,14 @@ use handeye_track::State;
 
 use super::*;
 use crate::testing::driven::Driven;
+use handeye_workbench::command::Command;
 use handeye_workbench::model::{
     BoardMotion, BoardPath, FollowStatus, FollowWish, LinkState, RotationFormat, Simulation, Solved, TrackState,
     Tracked,
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
+use handeye_workbench::track;
 
 fn driven(model: Model) -> Driven {
     Driven::new(track_ui, model)
@@ -40,11 +42,11 @@ fn tracking_is_started_and_stopped() {
     model.track = TrackState::default();
     let mut pane = driven(model);
     assert!(pane.sees("The board is not tracked"));
-    assert_eq!(pane.click("Start tracking"), [Command::SetTracking(true)]);
+    assert_eq!(pane.click("Start tracking"), [Command::Track(track::Command::SetTracking(true))]);
     pane.model().track.on = true;
     pane.steps();
     assert!(pane.sees("Waiting for the first image"));
-    assert_eq!(pane.click("Stop tracking"), [Command::SetTracking(false)]);
+    assert_eq!(pane.click("Stop tracking"), [Command::Track(track::Command::SetTracking(false))]);
 }
 
 #[test]
@@ -135,16 +137,19 @@ fn the_error_is_told_against_the_truth_of_the_simulator_and_only_where_there_is_
 #[test]
 fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     let mut pane = driven(tracked());
-    assert_eq!(pane.click("Follow"), [Command::SetFollow(Some(FollowWish::KeepViewWithRoom))]);
+    assert_eq!(pane.click("Follow"), [Command::Track(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)))]);
     pane.click("Make room first where it is needed");
-    assert_eq!(pane.click("Follow"), [Command::SetFollow(Some(FollowWish::KeepView))]);
+    assert_eq!(pane.click("Follow"), [Command::Track(track::Command::SetFollow(Some(FollowWish::KeepView)))]);
     pane.click("Tip to a corner");
     pane.type_into("Corner to go to", "12");
     pane.press(egui::Key::Enter);
     pane.type_into("Stand-off in mm", "80");
     pane.press(egui::Key::Enter);
     let sent = pane.click("Follow");
-    assert_eq!(sent, [Command::SetFollow(Some(FollowWish::Corner { index: 11, stand_off_m: 0.08 }))]);
+    assert_eq!(
+        sent,
+        [Command::Track(track::Command::SetFollow(Some(FollowWish::Corner { index: 11, stand_off_m: 0.08 })))]
+    );
     pane.model().track.wish = Some(FollowWish::KeepView);
     pane.steps();
     assert!(pane.sees("Starting to follow"));
@@ -155,12 +160,12 @@ fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     pane.steps();
     assert!(pane.sees("Following: 1.2 mm and 0.57° from the goal"));
     assert!(!pane.is_enabled("Keep this view"), "it is chosen before");
-    assert_eq!(pane.click("Stop following"), [Command::SetFollow(None)]);
+    assert_eq!(pane.click("Stop following"), [Command::Track(track::Command::SetFollow(None))]);
     pane.model().track.follow = FollowStatus::Ended(Text::verbatim("joint 3 is at its limit"));
     pane.steps();
     assert!(pane.sees("The arm does not follow the board: joint 3 is at its limit"));
     let again = FollowWish::Corner { index: 11, stand_off_m: 0.08 };
-    assert_eq!(pane.click("Follow again"), [Command::SetFollow(Some(again))]);
+    assert_eq!(pane.click("Follow again"), [Command::Track(track::Command::SetFollow(Some(again)))]);
 }
 
 #[test]
@@ -201,7 +206,10 @@ fn the_board_of_a_simulated_cell_is_moved_and_hidden() {
         ("Random", BoardPath::RandomWalk),
         ("Jumps", BoardPath::Step),
     ] {
-        assert_eq!(pane.click(label), [Command::MoveBoard(BoardMotion { path, speed_m_s: 0.05 })]);
+        assert_eq!(
+            pane.click(label),
+            [Command::Track(track::Command::MoveBoard(BoardMotion { path, speed_m_s: 0.05 }))]
+        );
     }
     pane.model().track.board = BoardMotion { path: BoardPath::Circle, speed_m_s: 0.05 };
     pane.steps();
@@ -209,13 +217,19 @@ fn the_board_of_a_simulated_cell_is_moved_and_hidden() {
     pane.type_into("Speed of the board in m/s", "0.2");
     let mut sent = pane.commands();
     sent.extend(pane.press(egui::Key::Enter));
-    assert_eq!(sent.last(), Some(&Command::MoveBoard(BoardMotion { path: BoardPath::Circle, speed_m_s: 0.2 })));
+    assert_eq!(
+        sent.last(),
+        Some(&Command::Track(track::Command::MoveBoard(BoardMotion { path: BoardPath::Circle, speed_m_s: 0.2 })))
+    );
     let sent = pane.click("Still");
-    assert!(matches!(sent[..], [Command::MoveBoard(BoardMotion { path: BoardPath::Still, .. })]), "{sent:?}");
-    assert_eq!(pane.click("Hide the board"), [Command::HideBoard(true)]);
+    assert!(
+        matches!(sent[..], [Command::Track(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, .. }))]),
+        "{sent:?}"
+    );
+    assert_eq!(pane.click("Hide the board"), [Command::Track(track::Command::HideBoard(true))]);
     pane.model().track.board_hidden = true;
     pane.steps();
-    assert_eq!(pane.click("Hide the board"), [Command::HideBoard(false)]);
+    assert_eq!(pane.click("Hide the board"), [Command::Track(track::Command::HideBoard(false))]);
 }
 
 #[test]

@@ -7,8 +7,9 @@ use handeye_session::CaptureId;
 use crate::style::numbers;
 use crate::style::theme::Palette;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
+use handeye_workbench::session;
 use handeye_workbench::tr;
 
 /// Squared error over what is stated that one capture in a hundred exceeds.
@@ -43,7 +44,7 @@ pub fn captures_ui(
             let name = text!("Capture {id}", id = id.0).say(language);
             let is_selected = model.selection.contains(id);
             if ui.selectable_label(is_selected, name).clicked() && !is_selected {
-                outbox.send(Command::Select(vec![*id]));
+                outbox.send(session::Command::Select(vec![*id]));
             }
             check_ui(ui, check);
             ui.end_row();

@@ -11,7 +11,8 @@ use handeye_session::Role;
 use crate::style::parts;
 use crate::style::theme::Tone;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::capture;
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{CapturePurpose, Model};
 use handeye_workbench::tr;
 
@@ -83,11 +84,11 @@ fn capture_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         };
         let button = Button::new(tr!(language, "Capture for verification"));
         if parts::gated_ui(ui, reason, button).clicked() {
-            outbox.send(Command::Capture(CapturePurpose::Verify));
+            outbox.send(capture::Command::Take(CapturePurpose::Verify));
         }
         let is_ours = model.capture.as_ref().is_some_and(|capture| capture.purpose == CapturePurpose::Verify);
         if is_ours && ui.button(tr!(language, "Cancel capture")).clicked() {
-            outbox.send(Command::CancelCapture);
+            outbox.send(capture::Command::Cancel);
         }
     });
     if let Some(reason) = reason_not_connected(model) {

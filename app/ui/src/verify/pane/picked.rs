@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 use crate::style::numbers;
 use crate::style::parts;
 use handeye_wording::text;
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
+use handeye_workbench::live;
 use handeye_workbench::model::Model;
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
@@ -32,7 +33,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let pixel = text!("Pixel {column}, {row}", column = picked.pixel.column, row = picked.pixel.row);
         parts::hint_ui(ui, &pixel.say(language));
         if ui.add(parts::small_button(ui, tr!(language, "Clear the point"))).clicked() {
-            outbox.send(Command::Pick(None));
+            outbox.send(live::Command::Pick(None));
         }
     });
     point_ui(ui, model, tr!(language, "From depth [mm]"), &picked.from_depth);

@@ -8,8 +8,9 @@ use crate::shell::reasons::unknown_arm;
 use crate::shell::sequence;
 use crate::style::parts;
 use crate::style::theme::{Palette, Tone};
-use handeye_workbench::command::{Command, Outbox};
+use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{CapturePurpose, Model, Motion, Pane, PoseSequence};
+use handeye_workbench::taught;
 use handeye_workbench::tr;
 
 /// The button that begins, or how far it is; and how it went.
@@ -40,7 +41,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
          there for verification. Stop the sequence and STOP end it; what was captured is kept"
     );
     if parts::gated_ui(ui, blocked(model), button).on_hover_text(what).clicked() {
-        outbox.send(Command::VerifyAtPlanned);
+        outbox.send(taught::Command::VerifyAtPlanned);
     }
     if let Some(message) = model.messages.standing_in(Pane::Verify) {
         parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());

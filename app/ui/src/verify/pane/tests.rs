@@ -6,11 +6,13 @@ use std::sync::Arc;
 
 use super::*;
 use crate::testing::driven::Driven;
+use handeye_workbench::command::Command;
 use handeye_workbench::model::{
     CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, PoseSequence, Severity, StopOutcome,
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
+use handeye_workbench::{capture, live, session, taught};
 
 fn driven(model: Model) -> Driven {
     Driven::new(verify_ui, model)
@@ -20,7 +22,10 @@ fn driven(model: Model) -> Driven {
 fn a_capture_for_verification_is_asked_for_and_cancelled() {
     let mut pane = driven(sample::connected());
     assert!(pane.sees("There is no calibration to verify yet"));
-    assert_eq!(pane.click("Capture for verification"), [Command::Capture(CapturePurpose::Verify)]);
+    assert_eq!(
+        pane.click("Capture for verification"),
+        [Command::Capture(capture::Command::Take(CapturePurpose::Verify))]
+    );
     pane.model().capture = Some(CaptureUnderWay {
         number: 1,
         purpose: CapturePurpose::Verify,
@@ -29,7 +34,7 @@ fn a_capture_for_verification_is_asked_for_and_cancelled() {
     });
     pane.steps();
     assert!(!pane.is_enabled("Capture for verification"));
-    assert_eq!(pane.click("Cancel capture"), [Command::CancelCapture]);
+    assert_eq!(pane.click("Cancel capture"), [Command::Capture(capture::Command::Cancel)]);
     pane.model().capture = None;
     pane.model().camera = LinkState::Failed { why: Text::verbatim("gone") };
     pane.steps();
@@ -52,7 +57,7 @@ fn errors_are_stated_in_millimetres_degrees_and_pixels_and_judged() {
     assert!(pane.sees("Its corners: 0.456 px"));
     assert!(pane.sees("Scatter of its position: –"));
     assert!(pane.sees("The errors are of the size that the calibration states"));
-    assert_eq!(pane.click("Capture 12"), [Command::Select(vec![CaptureId(12)])]);
+    assert_eq!(pane.click("Capture 12"), [Command::Session(session::Command::Select(vec![CaptureId(12)]))]);
 }
 
 #[test]
@@ -115,7 +120,7 @@ fn a_picked_point_is_measured_twice_and_the_difference_is_stated() {
     assert!(pane.sees("± 1 σ [mm]"));
     // Ten millimetres deeper along a ray that is almost the optical axis.
     assert!(pane.sees("Its length [mm]: 10.00"));
-    assert_eq!(pane.click("Clear the point"), [Command::Pick(None)]);
+    assert_eq!(pane.click("Clear the point"), [Command::Live(live::Command::Pick(None))]);
     let without = Text::verbatim("No depth at this pixel");
     if let Some(picked) = &mut pane.model().picked {
         picked.from_depth = Err(without);
@@ -130,7 +135,7 @@ const PLANNED: &str = "Verify at planned poses";
 #[test]
 fn captures_at_planned_poses_are_offered_where_they_can_be_taken_and_say_what_is_in_the_way() {
     let mut pane = driven(sample::solved());
-    assert_eq!(pane.click(PLANNED), [Command::VerifyAtPlanned]);
+    assert_eq!(pane.click(PLANNED), [Command::Taught(taught::Command::VerifyAtPlanned)]);
     let is_blocked = |change: fn(&mut Model)| {
         let mut model = sample::solved();
         change(&mut model);
@@ -165,7 +170,7 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     });
     pane.steps();
     assert!(pane.sees("Pose 3 of 3: V3"));
-    assert_eq!(pane.click("Stop the sequence"), [Command::StopSequence]);
+    assert_eq!(pane.click("Stop the sequence"), [Command::Taught(taught::Command::StopSequence)]);
     pane.model().sequence_runs = false;
     let why = Text::verbatim("it was broken off");
     pane.model().messages.say_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);

@@ -9,10 +9,10 @@ use handeye_files::bounds::Bounds;
 use handeye_session::{Capture, Document, Role, Store};
 
 use super::{Archive, free_folder, timestamp_rfc3339};
-use crate::command::Event;
 use crate::import::state::Converted;
 use crate::model::Severity;
 use crate::sample;
+use crate::session;
 use crate::session::start;
 use crate::text::Text;
 use handeye_wording::text;
@@ -34,7 +34,7 @@ impl Archive {
             }
             Err(error) => {
                 let why = text!("The data set was not opened: {why}", why = error);
-                self.outlet.report(Event::SessionFailed { why });
+                self.outlet.report(session::Event::Failed { why });
             }
         }
     }
@@ -67,7 +67,7 @@ impl Archive {
                 let folder = store.folder().display().to_string();
                 self.store = Some(store);
                 self.report_document();
-                self.outlet.report(Event::SessionOpened { exported: false });
+                self.outlet.report(session::Event::Opened { exported: false });
                 let text = text!("The data set was copied to the session {folder}", folder = folder);
                 self.outlet.notice(Severity::Info, text);
                 if outside > 0 {
@@ -79,7 +79,7 @@ impl Archive {
                 }
             }
             Err(why) => {
-                self.outlet.report(Event::SessionFailed { why });
+                self.outlet.report(session::Event::Failed { why });
                 return None;
             }
         }
@@ -136,6 +136,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::command::Event;
     use crate::text::Language;
     use crate::worker::link::Outlet;
 
@@ -156,7 +157,7 @@ mod tests {
         let (events, reported) = crossbeam_channel::unbounded();
         let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
         Archive::new(sessions.clone(), outlet).import(&dataset, &Bounds::ANYWHERE);
-        let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("it was opened") };
+        let Ok(Event::Session(session::Event::Failed { why })) = reported.try_recv() else { panic!("it was opened") };
         assert_eq!(
             why.say(Language::English),
             "The data set was not opened: row 1 (1.png) has no image: solve this data set with “handeye calibrate” \
@@ -195,7 +196,9 @@ mod tests {
             fs::write(upload.join("dataset.toml"), described.replace("POSES", poses)).expect("written");
             fs::write(upload.join("poses.csv"), format!("{header}{image},0.4,0,0.3,0,0,0,1\n")).expect("written");
             archive.open(&upload, &Bounds::within(&upload));
-            let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("{image} was opened") };
+            let Ok(Event::Session(session::Event::Failed { why })) = reported.try_recv() else {
+                panic!("{image} was opened")
+            };
             let why = why.say(Language::English);
             assert!(why.contains("outside of the folder") || why.contains("not a path relative"), "{image}: {why}");
             assert!(!why.contains("secret:") && !why.contains("root"), "{why}");
@@ -205,7 +208,9 @@ mod tests {
         for image in ["../../private.png", "linked.png", absolute.as_str(), "../../not-there.png"] {
             fs::write(upload.join("dataset.toml"), format!("images = ['{image}']\n{alone}")).expect("written");
             archive.open(&upload, &Bounds::within(&upload));
-            let Ok(Event::SessionFailed { why }) = reported.try_recv() else { panic!("{image} was opened") };
+            let Ok(Event::Session(session::Event::Failed { why })) = reported.try_recv() else {
+                panic!("{image} was opened")
+            };
             let why = why.say(Language::English);
             assert!(why.contains("outside of the folder") || why.contains("a path relative"), "{image}: {why}");
             assert!(!sessions.exists(), "nothing was begun");

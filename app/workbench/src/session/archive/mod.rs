@@ -15,12 +15,12 @@ use handeye_result::guided_record::{GUIDED_RECORD, GuidedRecord};
 use handeye_session::{Document, Edit, SessionError, SessionMeta, Store};
 
 use crate::capture::Measured;
-use crate::command::Event;
 use crate::import::state::Converted;
 use crate::model::{CaptureRefused, CaptureWait, FolderKind, Observed, RefusalKind, SessionState, Severity};
 use crate::text::Text;
 use crate::worker::files::kind_of;
 use crate::worker::link::Outlet;
+use crate::{capture, session};
 use handeye_wording::text;
 
 pub use folders::{free_folder, timestamp, timestamp_rfc3339};
@@ -158,17 +158,17 @@ impl Archive {
         match kind_of(folder) {
             FolderKind::Dataset => return self.import(folder, bounds),
             FolderKind::Images | FolderKind::Plain if folder.exists() => {
-                return self.outlet.report(Event::NoSession(folder.to_path_buf()));
+                return self.outlet.report(crate::import::Event::NoSession(folder.to_path_buf()));
             }
             _ => {}
         }
         if self.store.as_ref().is_some_and(|store| store.folder() == folder) {
-            self.outlet.report(Event::SessionOpened { exported: exported::is_exported(folder) });
+            self.outlet.report(session::Event::Opened { exported: exported::is_exported(folder) });
             return;
         }
         if let Err(error) = bounds.check_links(folder) {
             let why = text!("The session was not opened: {error}", error = error);
-            return self.outlet.report(Event::SessionFailed { why });
+            return self.outlet.report(session::Event::Failed { why });
         }
         let opened = Store::open(folder);
         self.take(opened, |error| text!("The session was not opened: {error}", error = error));
@@ -211,9 +211,9 @@ impl Archive {
                 let exported = exported::is_exported(store.folder());
                 self.store = Some(store);
                 self.report_document();
-                self.outlet.report(Event::SessionOpened { exported });
+                self.outlet.report(session::Event::Opened { exported });
             }
-            Err(error) => self.outlet.report(Event::SessionFailed { why: words(error) }),
+            Err(error) => self.outlet.report(session::Event::Failed { why: words(error) }),
         }
     }
 
@@ -236,7 +236,7 @@ impl Archive {
     }
 
     fn keep(&mut self, measured: &Measured) {
-        self.outlet.report(Event::CaptureWaits { number: measured.number, wait: CaptureWait::Saving });
+        self.outlet.report(capture::Event::Waits { number: measured.number, wait: CaptureWait::Saving });
         let kept = self.store().and_then(|store| measured.record(store));
         match kept {
             Ok(id) => {
@@ -247,14 +247,14 @@ impl Archive {
                     thumbnail: Arc::new(measured.thumbnail.clone()),
                 };
                 let target = measured.target;
-                self.outlet.report(Event::Observed { id, target, observed: Some(Arc::new(observed)) });
+                self.outlet.report(session::Event::Observed { id, target, observed: Some(Arc::new(observed)) });
                 self.report_document();
-                self.outlet.report(Event::Captured { number: measured.number, id });
+                self.outlet.report(capture::Event::Captured { number: measured.number, id });
             }
             Err(error) => {
                 let why = text!("The capture was not kept: {error}", error = error);
                 let refused = CaptureRefused { kind: RefusalKind::NotSaved, why, at_s: self.outlet.now_s() };
-                self.outlet.report(Event::CaptureRefused { number: measured.number, refused });
+                self.outlet.report(capture::Event::Refused { number: measured.number, refused });
             }
         }
     }
@@ -298,6 +298,6 @@ impl Archive {
             }
             (None, None) => return,
         };
-        self.outlet.report(Event::Document(Box::new(state)));
+        self.outlet.report(session::Event::Document(Box::new(state)));
     }
 }

@@ -23,6 +23,7 @@ use crate::model::{
     CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait, CellSource, ColouredDepth, DepthScale, FrameImages,
     FrameInfo, LiveDetection, LiveFrame, ViewSettings,
 };
+use crate::{capture, live};
 
 /// A healthy cell answers within milliseconds; this is for a machine that does something else.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -132,14 +133,14 @@ impl Table {
 
     pub fn refused(&self) -> Option<CaptureRefused> {
         self.events.try_iter().find_map(|event| match event {
-            Event::CaptureRefused { refused, .. } => Some(refused),
+            Event::Capture(capture::Event::Refused { refused, .. }) => Some(refused),
             _ => None,
         })
     }
 
     pub fn waits(&self) -> Vec<(u64, CaptureWait)> {
         let waits = self.events.try_iter().filter_map(|event| match event {
-            Event::CaptureWaits { number, wait } => Some((number, wait)),
+            Event::Capture(capture::Event::Waits { number, wait }) => Some((number, wait)),
             _ => None,
         });
         waits.collect()
@@ -201,7 +202,7 @@ impl CellBench {
             let Self { workers, events, .. } = self;
             workers.drain(|event| events.push(event));
             for event in &self.events[before..] {
-                if let Event::CaptureRefused { number: which, refused } = event
+                if let Event::Capture(capture::Event::Refused { number: which, refused }) = event
                     && *which == number
                 {
                     return Err(refused.clone());
@@ -216,7 +217,7 @@ impl CellBench {
         while found.len() < count {
             self.woken.recv_timeout(PATIENCE).expect("images come");
             self.workers.drain(|event| {
-                if let Event::Detection(detection) = event {
+                if let Event::Live(live::Event::Detection(detection)) = event {
                     found.push(*detection);
                 }
             });

@@ -23,10 +23,10 @@ use search::Search;
 use super::link::Outlet;
 use super::slot::{LatestSlot, Tap};
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
-use crate::command::Event;
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
 use crate::track::follow_line::FollowLine;
 use crate::track::worker::{TrackedImage, Tracking};
+use crate::{capture, track};
 
 /// How often the clock is looked at while a capture waits for images that do not come.
 const CLOCK_PERIOD: Duration = Duration::from_millis(100);
@@ -191,7 +191,7 @@ impl Vision {
         let Some(setup) = setup else { return };
         match Tracking::new(*setup, Arc::clone(&self.sights.follow)) {
             Ok(tracking) => self.tracking = Some(tracking),
-            Err(error) => self.outlet.report(Event::TrackFailed { why: error.into() }),
+            Err(error) => self.outlet.report(track::Event::Failed { why: error.into() }),
         }
     }
 
@@ -230,7 +230,7 @@ impl Vision {
             }
             Err(error) => {
                 self.tracking = None;
-                self.outlet.report(Event::TrackFailed { why: error.into() });
+                self.outlet.report(track::Event::Failed { why: error.into() });
             }
         }
     }
@@ -288,7 +288,7 @@ impl Vision {
         if let Some(capture) = self.capture.as_mut().filter(|capture| capture.told != Some(wait)) {
             capture.told = Some(wait);
             let number = capture.sequence.number();
-            self.outlet.report(Event::CaptureWaits { number, wait });
+            self.outlet.report(capture::Event::Waits { number, wait });
         }
     }
 
@@ -301,7 +301,7 @@ impl Vision {
 
     fn report_refusal(&self, number: u64, (kind, why): refusal::Why) {
         let refused = CaptureRefused { kind, why, at_s: self.outlet.now_s() };
-        self.outlet.report(Event::CaptureRefused { number, refused });
+        self.outlet.report(capture::Event::Refused { number, refused });
     }
 }
 

@@ -8,6 +8,7 @@ use handeye_cell::scene::Scene;
 use handeye_coppeliasim::{CancelToken, MotionLimits};
 use handeye_dataset::taught_poses::{Goal, TaughtPoses};
 
+use crate::capture;
 use crate::command::Event;
 use crate::model::{CaptureWait, RefusalKind};
 use crate::worker::vision::VisionTask;
@@ -62,10 +63,9 @@ fn captured_around_moves(scene: Scene, bound_px: f64) {
         }
         motion.join().expect("the motion ends well");
     }
-    let moved = bench
-        .events
-        .iter()
-        .filter(|event| matches!(event, Event::CaptureWaits { wait: CaptureWait::Images(Wait::RobotMoves), .. }));
+    let moved = bench.events.iter().filter(|event| {
+        matches!(event, Event::Capture(capture::Event::Waits { wait: CaptureWait::Images(Wait::RobotMoves), .. }))
+    });
     assert!(moved.count() >= 3, "captures were asked for in motion");
 }
 

@@ -1,0 +1,65 @@
+//! What may be wanted of recordings in other tools' formats, and what is reported.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::{Converted, Found, ImportWork};
+use crate::text::Text;
+
+/// What the user wants of recordings in other tools' formats.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// The target of the recording that is imported, as it is typed; empty: as its files have it.
+    SetTarget(String),
+    /// Read the files of the recording again, for so many seconds at the most.
+    SetTime(u32),
+    /// A convention of that recording, which the data need not tell.
+    FixConvention {
+        /// Its key, as `handeye import --set` has it.
+        key: String,
+        /// Its value; `None`: as the data tell.
+        value: Option<String>,
+    },
+    /// Take this hypothesis about the recording, by its place in the list.
+    ChooseHypothesis(usize),
+    /// Make a session of the recording.
+    ConvertRecording,
+    /// Makes a session of the images alone, to calibrate the camera by itself.
+    ConvertImages,
+}
+
+/// What has happened to recordings in other tools' formats.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Event {
+    /// There is neither a session nor a data set: it may be somebody's recording.
+    NoSession(PathBuf),
+    /// How far a recording is looked at, or converted.
+    Progress {
+        /// The number of the request.
+        number: u64,
+        /// How far.
+        work: ImportWork,
+    },
+    /// A recording was looked at.
+    #[serde(skip)]
+    Looked {
+        /// The number of the request.
+        number: u64,
+        /// What was found; `None` where its files cannot be read.
+        found: Option<Arc<Found>>,
+        /// Why no more was.
+        trouble: Option<Text>,
+    },
+    /// A recording was made a data set, or cannot be.
+    #[serde(skip)]
+    Converted {
+        /// The number of the request.
+        number: u64,
+        /// The data set.
+        converted: Result<Arc<Converted>, Text>,
+    },
+}

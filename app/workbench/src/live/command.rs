@@ -1,0 +1,45 @@
+//! What may be wanted of the live images, and what is reported.
+
+use std::sync::Arc;
+
+use handeye_geometry::depth::ColourMap;
+use serde::{Deserialize, Serialize};
+
+use crate::model::{DepthScale, FrameImages, FrameInfo, ImagePoint, LiveDetection, Overlays, Viewport};
+
+/// What the user wants of the live images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// Which depths the colour map covers.
+    SetDepthScale(DepthScale),
+    /// The colours of depths.
+    SetDepthColours(ColourMap),
+    /// What is drawn over the images.
+    SetOverlays(Overlays),
+    /// Which part of the images is shown, and how large.
+    SetViewport(Viewport),
+    /// The pointer is over a pixel of the images, or over none.
+    PointAt(Option<ImagePoint>),
+    /// Measure the point at a pixel of the image in base coordinates.
+    Pick(Option<ImagePoint>),
+}
+
+/// What has happened to the live images.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Event {
+    /// New images.
+    Frame {
+        /// Their circumstances.
+        info: FrameInfo,
+        /// Frames so far that were never shown.
+        dropped: u64,
+        /// The pixels, which a log does not keep.
+        #[serde(skip)]
+        images: Option<Arc<FrameImages>>,
+    },
+    /// The newest image was searched for the board.
+    #[serde(skip)]
+    Detection(Box<LiveDetection>),
+}

@@ -1,0 +1,27 @@
+//! What may be wanted of messages, and what is reported.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::Severity;
+use crate::text::Text;
+
+/// What the user wants of messages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// A message needs no more attention.
+    Dismiss(u64),
+}
+
+/// What has happened to messages.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Event {
+    /// Something to tell the user.
+    Notice {
+        /// How much it matters.
+        severity: Severity,
+        /// The words.
+        text: Text,
+    },
+}

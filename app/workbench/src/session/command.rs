@@ -1,0 +1,99 @@
+//! What may be wanted of the session, and what is reported.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use handeye_dataset::CameraInput;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::targets::TargetSpec;
+use handeye_session::CaptureId;
+use serde::{Deserialize, Serialize};
+
+use crate::model::{CapturePurpose, FolderListing, FrameImages, Observed, RecentSession, SessionState};
+use crate::text::Text;
+
+/// What the user wants of the session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// Begin a session, in a folder or under the folder of sessions.
+    New(Option<PathBuf>),
+    /// Go on with a session, or copy a data set into one.
+    Open(PathBuf),
+    /// Copy the recorded sample that comes with the program into a session.
+    OpenSample,
+    /// Go on with a complete copy in another folder.
+    SaveAs(PathBuf),
+    /// Read the folders in a folder.
+    ListFolder(PathBuf),
+    /// Show a folder in the file manager of the system.
+    OpenFolder(PathBuf),
+    /// Take the last change of the session back.
+    Undo,
+    /// Make the change again that was taken back.
+    Redo,
+    /// Which captures are selected; the last one's image is shown.
+    Select(Vec<CaptureId>),
+    /// Show the live image again.
+    BackToLive,
+    /// Take captures out of the fit, or back in.
+    SetExcluded {
+        /// Which.
+        ids: Vec<CaptureId>,
+        /// Out.
+        excluded: bool,
+    },
+    /// Captures enter the fit or verify it.
+    SetPurpose {
+        /// Which.
+        ids: Vec<CaptureId>,
+        /// What they are for.
+        purpose: CapturePurpose,
+    },
+    /// Delete captures; undo brings them back.
+    Delete(Vec<CaptureId>),
+    /// The camera sits elsewhere.
+    SetMode(Mode),
+    /// What is known of the camera.
+    SetCamera(Option<CameraInput>),
+}
+
+/// What has happened to the session.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Event {
+    /// The session is now like this, on the disk.
+    Document(Box<SessionState>),
+    /// Another session is open.
+    Opened {
+        /// Whether its folder has files of exports that are younger than its last change.
+        exported: bool,
+    },
+    /// A session could not be begun, opened or copied.
+    Failed {
+        /// Why.
+        why: Text,
+    },
+    /// A capture was looked at.
+    Observed {
+        /// Which.
+        id: CaptureId,
+        /// What was looked for.
+        target: TargetSpec,
+        /// What was seen; `None` when the image cannot be read.
+        #[serde(skip)]
+        observed: Option<Arc<Observed>>,
+    },
+    /// The images of a capture were read.
+    Review {
+        /// Which capture.
+        id: CaptureId,
+        /// The pixels, which a log does not keep.
+        #[serde(skip)]
+        images: Option<Arc<FrameImages>>,
+    },
+    /// Folders were read.
+    Folder(FolderListing),
+    /// Sessions that were open before.
+    Recent(Vec<RecentSession>),
+}

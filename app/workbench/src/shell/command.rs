@@ -1,0 +1,27 @@
+//! What may be wanted of the window around the panes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::{Dialog, Pane, RotationFormat, Step, ThemeChoice};
+use crate::text::Language;
+
+/// What the user wants of the window around the panes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// Light or dark.
+    SetTheme(ThemeChoice),
+    /// Of all words.
+    SetLanguage(Language),
+    /// How rotations are written.
+    SetRotationFormat(RotationFormat),
+    /// Which step of the work is in front.
+    GoToStep(Step),
+    /// Which dialog is open.
+    SetDialog(Option<Dialog>),
+    /// Bring a pane to the front.
+    ShowPane(Pane),
+    /// Put every pane where it was at first.
+    ResetLayout,
+}

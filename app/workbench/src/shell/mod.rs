@@ -1,0 +1,6 @@
+//! The window around the panes: steps, dialogs, language and theme.
+
+pub mod command;
+pub(crate) mod state;
+
+pub use command::Command;

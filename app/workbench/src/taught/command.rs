@@ -1,0 +1,76 @@
+//! What may be wanted of taught poses and sequences, and what is reported.
+
+use std::path::PathBuf;
+
+use handeye_arm::JointValues;
+use handeye_dataset::taught_poses::TaughtPose;
+use serde::{Deserialize, Serialize};
+
+use crate::model::{CapturePurpose, MotionId};
+use crate::text::Text;
+
+/// What the user wants of taught poses and sequences.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// Remember the place of the arm as a taught pose.
+    Teach {
+        /// Its name; one is found when there is none.
+        name: Option<String>,
+    },
+    /// Forget a taught pose.
+    Remove(String),
+    /// Call a taught pose something else.
+    Rename {
+        /// Its name now.
+        from: String,
+        /// Its name afterwards.
+        to: String,
+    },
+    /// Visit a taught pose earlier or later.
+    Reorder {
+        /// Which.
+        name: String,
+        /// Its place afterwards, counted from 0.
+        to: usize,
+    },
+    /// The ten reference poses instead of those that are taught.
+    TeachReference,
+    /// Take the taught poses of other cells for those of this one.
+    Adopt,
+    /// Taught poses from a file, after those that are there.
+    Import(PathBuf),
+    /// Taught poses into a file.
+    Export(PathBuf),
+    /// Move to a taught pose.
+    GoTo(String),
+    /// Visit all taught poses.
+    RunSequence {
+        /// What is captured at each; `None` only moves.
+        purpose: Option<CapturePurpose>,
+    },
+    /// Go on with the sequence that was broken off, at the pose at which it was.
+    ContinueSequence,
+    /// No more poses.
+    StopSequence,
+    /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
+    VerifyAtPlanned,
+}
+
+/// What has happened to taught poses and sequences.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Event {
+    /// Taught poses were read from a file.
+    Read {
+        /// Them.
+        poses: Vec<TaughtPose>,
+    },
+    /// Poses to look at the board from were planned, or cannot be.
+    Planned {
+        /// The number of the request.
+        id: MotionId,
+        /// The joints at each \[rad\]; or why there are none.
+        views: Result<Vec<JointValues>, Text>,
+    },
+}

@@ -1,0 +1,39 @@
+//! What may be wanted of tracking and following the board, and what is reported.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::{BoardMotion, FollowStatus, FollowWish, Tracked};
+use crate::text::Text;
+
+/// What the user wants of tracking and following the board.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
+#[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
+pub enum Command {
+    /// Track the board in every image, or no more.
+    SetTracking(bool),
+    /// Have the arm follow the board; `None` has it come to rest.
+    SetFollow(Option<FollowWish>),
+    /// Have the simulated cell move its board.
+    MoveBoard(BoardMotion),
+    /// Hide the board of the simulated cell, or show it again.
+    HideBoard(bool),
+}
+
+/// What has happened to tracking and following the board.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub enum Event {
+    /// The board in the newest image that was tracked.
+    #[serde(skip)]
+    Tracked(Arc<Tracked>),
+    /// The board is tracked no more.
+    Failed {
+        /// Why, and what to do.
+        why: Text,
+    },
+    /// The arm follows the board, or does not.
+    #[serde(skip)]
+    Follow(FollowStatus),
+}
