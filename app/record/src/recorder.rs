@@ -47,7 +47,7 @@ pub struct RecorderOptions {
 /// When the file that was named cannot be made, or the system has no more threads.
 pub fn record(app: &mut App, choice: RerunChoice, web: WebViewer) -> io::Result<()> {
     if choice != RerunChoice::Off {
-        let waker = Arc::clone(&app.waker);
+        let waker = Arc::clone(app.waker());
         let options = RecorderOptions { choice, pace: Pace::Live, beside_session: true, web, waker };
         app.record_into(Recorder::start(options)?);
     }

@@ -105,7 +105,7 @@ impl Host {
         let (remembered, layout) = memory.last();
         let mut window = opening.window(&ctx, remembered, layout, Some(shown))?;
         let app = window.app_mut();
-        signals.lead_to(Arc::clone(app.stop_line()), Arc::clone(&app.waker));
+        signals.lead_to(Arc::clone(app.stop_line()), Arc::clone(app.waker()));
         let grip = Arc::clone(app.stop_line().grip());
         let now = Instant::now();
         Ok(Self {

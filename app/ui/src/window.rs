@@ -111,7 +111,7 @@ impl Window {
     #[cfg(feature = "window")]
     #[must_use]
     pub fn that_heeds(self, signals: Arc<Signals>) -> Self {
-        signals.lead_to(Arc::clone(self.app.stop_line()), Arc::clone(&self.app.waker));
+        signals.lead_to(Arc::clone(self.app.stop_line()), Arc::clone(self.app.waker()));
         Self { signals: Some(signals), ..self }
     }
 

@@ -6,6 +6,7 @@
 use std::time::{Duration, Instant};
 
 use super::App;
+use crate::keep_out::update::keep_keep_out;
 
 /// How long all of it may take. The system gives a program that it asks to end a few seconds, a person less.
 const ALL: Duration = Duration::from_millis(1500);
@@ -24,23 +25,23 @@ impl App {
             return;
         }
         self.leave_by = Some(Instant::now() + ALL);
-        self.model.sequence_runs = false;
-        self.keep_keep_out(true);
+        self.cx.model.sequence_runs = false;
+        keep_keep_out(&mut self.cx.model, &self.cx.desk, true);
         // Another client's motions are none of our business.
-        if self.workers.is_moving() {
-            self.workers.press_stop();
+        if self.cx.workers.is_moving() {
+            self.cx.workers.press_stop();
         }
-        self.desk.cancel_all();
+        self.cx.desk.cancel_all();
     }
 
     fn leave(&mut self) {
         self.begin_to_leave();
         let by = self.leave_by.unwrap_or_else(Instant::now);
-        if !self.workers.come_to_rest(before(by, FOR_THREADS)) {
+        if !self.cx.workers.come_to_rest(before(by, FOR_THREADS)) {
             tracing::warn!("the arm is left before it has come to rest; it gets no further points to go to");
         }
-        self.workers.shut_down(before(by, FOR_FILES).saturating_duration_since(Instant::now()));
-        self.desk.end(by);
+        self.cx.workers.shut_down(before(by, FOR_FILES).saturating_duration_since(Instant::now()));
+        self.cx.desk.end(by);
         let left = by.saturating_duration_since(Instant::now());
         if self.recording.as_mut().is_some_and(|recording| !recording.finish(left)) {
             tracing::warn!("the end of the recording for Rerun was not written in time");

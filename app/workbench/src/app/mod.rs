@@ -1,23 +1,30 @@
 //! The application without its window: the model, the workers, and the only two ways to change the model.
 //!
-//! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each part of the work has a file of
-//! its own here; all of them change the model of the one [`App`] and hand work to threads, and none waits.
+//! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each hands on to the feature that it
+//! concerns, whose `update` changes the model and hands work to threads; what it is given here is all that it can reach. None
+//! waits.
 
+mod context;
 mod leave;
 mod reach;
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use handeye_coppeliasim::cell::CellPaths;
-use handeye_files::bounds::Bounds;
 
+use crate::by_hand::update::guided_by_hand_step;
 use crate::command::{Command, Event, Outbox};
-use crate::model::{CellSource, Drivers, JobId, LiveFrame, Model, MotionId, Severity, ViewSettings};
+use crate::guided::update::guided_step;
+use crate::keep_out::update::{keep_keep_out, send_keep_out};
+use crate::model::{CellSource, Drivers, Model, Severity, ViewSettings};
+use crate::motion::rest::{stop_asked, stop_waits};
 use crate::recording::Recording;
 use crate::recording::recorded::Recorded;
+use crate::scene::update::fit_scene;
+use crate::session::update::{open_or_begin, prepare_session, send_target};
 use crate::settings::SettingsWrite;
 use crate::worker::{Cell, Clock, FileTask, SessionThreads, StopLine, Waker, Workers};
 use crate::{
@@ -26,7 +33,9 @@ use crate::{
 };
 use handeye_wording::text;
 
+pub(crate) use context::{Connector, Context, Numbers};
 pub use reach::Reach;
+pub(crate) use reach::bounds_of;
 
 /// Makes what connects to a cell.
 pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Cell> + Send + Sync>;
@@ -64,42 +73,17 @@ pub struct InBrowser {
 
 /// Model and workers.
 pub struct App {
-    pub(crate) model: Model,
-    /// The threads that talk to the cell; others take their place when another cell is chosen.
-    pub(crate) workers: Workers,
-    pub(crate) desk: SessionThreads,
-    pub(crate) connect: Connect,
-    pub(crate) clock: Clock,
-    /// Has the window drawn again.
-    pub waker: Waker,
-    pub(crate) numbers: Numbers,
-    /// The question that the solver was asked last.
-    pub(crate) asked: Option<crate::solve::question::Question>,
+    pub(crate) cx: Context,
+    connector: Connector,
     /// Nothing is recorded without.
-    pub(crate) recording: Option<Box<dyn Recording>>,
-    pub(crate) recorded: Recorded,
+    recording: Option<Box<dyn Recording>>,
+    recorded: Recorded,
     /// Until when everything has to be over, once the application ends.
-    pub(crate) leave_by: Option<Instant>,
+    leave_by: Option<Instant>,
     /// Stops of other threads that were taken note of.
-    pub(crate) outside_stops: u64,
+    outside_stops: u64,
     /// What commands may reach, if not everything.
     reach: Option<Reach>,
-}
-
-/// The last numbers that were given to requests.
-#[derive(Debug, Default)]
-pub(crate) struct Numbers {
-    pub(crate) capture: u64,
-    pub(crate) job: JobId,
-    pub(crate) motion: MotionId,
-    /// The motion that follows the board.
-    pub(crate) follow: Option<MotionId>,
-    /// The request for poses to verify at that is not answered yet.
-    pub(crate) plan: Option<MotionId>,
-    /// The request for a view for a person to bring about.
-    pub(crate) view: u64,
-    /// The request about a recording.
-    pub(crate) import: u64,
 }
 
 impl App {
@@ -118,59 +102,85 @@ impl App {
         let model = Model { addresses, drivers, objects, sessions, in_browser: shown, ..Model::new(source, view) };
         let (keep_out, fault) = crate::keep_out::update::opened(keep_out);
         let model = Model { keep_out, ..model };
-        let numbers = Numbers::default();
         let mut app = Self {
-            model,
-            workers,
-            desk,
-            connect,
-            clock,
-            waker,
-            numbers,
-            asked: None,
+            cx: Context { model, workers, desk, numbers: Numbers::default() },
+            connector: Connector { connect, clock, waker },
             recording: None,
             recorded: Recorded::default(),
             leave_by: None,
             outside_stops: 0,
             reach: in_browser.map(|shown| shown.reach),
         };
+        let cx = &mut app.cx;
         if let Some(fault) = fault {
-            app.say(Severity::Error, fault);
+            cx.model.say(Severity::Error, fault);
         }
-        app.prepare_session();
-        app.send_target();
-        app.send_keep_out();
+        prepare_session(&mut cx.model, &cx.desk);
+        send_target(&mut cx.model, &cx.workers);
+        send_keep_out(&cx.model, &cx.workers);
         if let Some(folder) = open {
-            app.open_or_begin(folder);
+            open_or_begin(&mut cx.model, &cx.desk, folder);
         }
         Ok(app)
     }
 
     /// What the window shows.
     pub fn model(&self) -> &Model {
-        &self.model
+        &self.cx.model
+    }
+
+    /// Has the window drawn again.
+    pub fn waker(&self) -> &Waker {
+        &self.connector.waker
     }
 
     /// Goes on from a model that a test has made up. The workers do not hear of it.
     #[cfg(feature = "testing")]
     pub fn replace_model(&mut self, model: Model) {
-        self.model = model;
+        self.cx.model = model;
+    }
+
+    /// Has everything recorded from here on; without it nothing is.
+    pub fn record_into(&mut self, recording: impl Recording + 'static) {
+        self.recording = Some(Box::new(recording));
     }
 
     /// Takes in what the workers have reported. Never waits for them.
     pub fn collect(&mut self) {
         self.take_outside_stops();
-        self.absorb(Event::Tick { now_s: (self.clock)() });
+        self.absorb(Event::Tick { now_s: (self.connector.clock)() });
         let mut events = Vec::new();
-        self.workers.drain(|event| events.push(event));
-        self.desk.drain(|event| events.push(event));
+        self.cx.workers.drain(|event| events.push(event));
+        self.cx.desk.drain(|event| events.push(event));
         if let Some(recording) = &self.recording {
             recording.drain(&mut |event| events.push(event));
         }
         for event in events {
             self.absorb(event);
         }
-        self.record_changes();
+        if let Some(recording) = &self.recording {
+            recording::update::note_changes(recording.as_ref(), &self.cx.model, &mut self.recorded);
+        }
+    }
+
+    /// Takes note of stops that other threads have pressed. Nothing that moves begins before: a sequence would go on with
+    /// its next pose.
+    fn take_outside_stops(&mut self) {
+        let pressed = self.stop_line().outside();
+        if std::mem::replace(&mut self.outside_stops, pressed) < pressed {
+            stop_asked(&mut self.cx.model, &self.cx.workers);
+        }
+    }
+
+    /// What is asked for from now on was asked for after so many stops of other threads.
+    pub fn note_stops(&mut self, pressed: u64) {
+        self.take_outside_stops();
+        self.stop_line().note(pressed);
+    }
+
+    /// What stops the arm, for other threads.
+    pub fn stop_line(&self) -> &Arc<StopLine> {
+        self.cx.workers.stop_line()
     }
 
     /// Applies the commands of a frame of the window.
@@ -181,223 +191,77 @@ impl App {
         }
     }
 
-    /// What files in a folder that is opened may name: anything, where somebody sits at this machine.
-    pub(crate) fn bounds_of(&self, path: &Path) -> Bounds {
-        self.reach.as_ref().map_or(Bounds::ANYWHERE, |reach| reach.bounds_of(path))
-    }
-
     /// Does what the user wants, or has a worker do it. Never waits for a worker.
     pub fn apply(&mut self, command: impl Into<Command>) {
         let command = command.into();
-        if let Some(why) = self.reach.as_ref().and_then(|reach| reach.refusal(&command)) {
-            self.say(Severity::Warning, why);
-            return;
+        let Self { cx, connector, recording, reach, .. } = self;
+        let reach = reach.as_ref();
+        if let Some(why) = reach.and_then(|reach| reach.refusal(&command)) {
+            return cx.model.say(Severity::Warning, why);
         }
+        let Context { model, workers, desk, numbers } = cx;
         match command {
-            Command::Motion(motion::Command::Stop) => self.stop(),
-            Command::Connect(connect::Command::StartSimulation) => self.start_simulation(),
-            Command::Connect(connect::Command::Reconnect) => self.reconnect(),
-            Command::Connect(connect::Command::StopTrying) => self.stop_trying(),
-            Command::Connect(connect::Command::Connect(source)) => self.connect(source),
-            Command::Connect(connect::Command::Arm(on)) => self.arm(on),
-            Command::Connect(connect::Command::TypePose(pose)) => self.type_pose(Some(pose)),
-            Command::Connect(connect::Command::SetObjects(objects)) => self.set_objects(objects),
-            Command::KeepOut(keep_out::Command::Set(content)) => self.set_keep_out(*content),
-            Command::KeepOut(keep_out::Command::Import(file)) => self.import_keep_out(file),
-            Command::KeepOut(keep_out::Command::Export(file)) => self.export_keep_out(file),
-            Command::Target(target::Command::Print(page)) => self.print_target(page),
-
-            Command::Shell(shell::Command::SetTheme(theme)) => self.model.view.theme = theme,
-            Command::Shell(shell::Command::SetLanguage(language)) => self.model.view.language = language,
-            Command::Shell(shell::Command::SetRotationFormat(format)) => self.model.view.rotation = format,
-            Command::Live(live::Command::SetDepthScale(scale)) => self.set_depth_scale(scale),
-            Command::Live(live::Command::SetDepthColours(colours)) => self.set_depth_colours(colours),
-            Command::Live(live::Command::SetOverlays(overlays)) => self.model.view.overlays = overlays,
-            Command::Live(live::Command::SetViewport(viewport)) => self.model.viewport = viewport,
-            Command::Scene(scene::Command::SetView(view)) => self.model.scene = view,
-            Command::Live(live::Command::PointAt(point)) => self.model.cursor = point,
-            Command::Live(live::Command::Pick(pixel)) => self.pick(pixel),
-            Command::Shell(shell::Command::GoToStep(step)) => self.model.step = step,
-            Command::Shell(shell::Command::SetDialog(dialog)) => self.set_dialog(dialog),
-            Command::Messages(messages::Command::Dismiss(number)) => self.model.messages.dismiss(number),
-            // Where panes are is the window's business.
-            Command::Shell(shell::Command::ShowPane(_) | shell::Command::ResetLayout) => {}
-
-            Command::Motion(motion::Command::Move { goal, what }) => self.start_motion(goal, what),
-            Command::Motion(motion::Command::Jog(jog)) => self.jog(jog),
-            Command::Motion(motion::Command::JogHeld(jog)) => self.hold_jog(jog),
-            Command::Motion(motion::Command::JogReleased) => self.release_jog(),
-            Command::Motion(motion::Command::SetJog(settings)) => self.model.view.jog = settings,
-            Command::Taught(taught::Command::Teach { name }) => self.teach(name),
-            Command::Taught(taught::Command::Remove(name)) => self.remove_taught(&name),
-            Command::Taught(taught::Command::Rename { from, to }) => self.rename_taught(&from, &to),
-            Command::Taught(taught::Command::Reorder { name, to }) => self.reorder_taught(&name, to),
-            Command::Taught(taught::Command::TeachReference) => self.teach_reference(),
-            Command::Taught(taught::Command::Import(file)) => self.import_taught(file),
-            Command::Taught(taught::Command::Export(file)) => self.export_taught(file),
-            Command::Taught(taught::Command::Adopt) => self.adopt_taught(),
-            Command::Taught(taught::Command::GoTo(name)) => self.visit_taught(&name),
-            Command::Motion(motion::Command::GoToCapture(id)) => self.go_to_capture(id),
-            Command::Taught(taught::Command::RunSequence { purpose }) => self.run_sequence(purpose),
-            Command::Taught(taught::Command::ContinueSequence) => self.continue_sequence(),
-            Command::Motion(motion::Command::GoHome) => self.go_home(),
-            Command::Connect(connect::Command::ResetCell) => self.reset_cell(),
-            Command::Guided(guided::Command::CalibrateForMe) => self.calibrate_for_me(),
-            Command::Motion(motion::Command::ConfirmMove) => self.confirm_move(),
-            Command::Motion(motion::Command::SkipMove) => self.skip_move(),
-            Command::Motion(motion::Command::SetConfirmMoves(confirm)) => self.set_confirm_moves(confirm),
-            Command::ByHand(by_hand::Command::Guide) => self.guide_by_hand(),
-            Command::ByHand(by_hand::Command::SkipView) => self.skip_view(),
-            Command::ByHand(by_hand::Command::StopGuiding) => self.stop_guiding(),
-            Command::Taught(taught::Command::VerifyAtPlanned) => self.plan_verification(),
-            Command::Taught(taught::Command::StopSequence) => self.stop_sequence(),
-
-            Command::Capture(capture::Command::Take(purpose)) => self.capture(purpose, None),
-            Command::Capture(capture::Command::Cancel) => self.cancel_capture(),
-            Command::Capture(capture::Command::SetOptions(options)) => self.model.view.capture = options,
-            Command::Session(session::Command::Select(ids)) => self.select(ids),
-            Command::Session(session::Command::BackToLive) => self.back_to_live(),
-
-            Command::Session(session::Command::SetExcluded { ids, excluded }) => self.set_excluded(ids, excluded),
-            Command::Session(session::Command::SetPurpose { ids, purpose }) => self.set_purpose(ids, purpose),
-            Command::Session(session::Command::Delete(ids)) => self.delete(ids),
-            Command::Session(session::Command::Undo) => self.undo(),
-            Command::Session(session::Command::Redo) => self.redo(),
-            Command::Target(target::Command::Set(target)) => self.set_target(target),
-            Command::Session(session::Command::SetMode(mode)) => self.set_mode(mode),
-            Command::Session(session::Command::SetCamera(camera)) => self.set_camera(camera),
-            Command::Session(session::Command::New(folder)) => self.new_session(folder),
-            Command::Session(session::Command::Open(folder)) => self.open(folder),
-            Command::Session(session::Command::OpenSample) => self.open_sample(),
-            Command::Import(import::Command::SetTarget(typed)) => self.set_import_target(typed),
-            Command::Import(import::Command::SetTime(seconds)) => self.set_import_time(seconds),
-            Command::Import(import::Command::FixConvention { key, value }) => self.fix_convention(key, value),
-            Command::Import(import::Command::ChooseHypothesis(place)) => self.choose_hypothesis(place),
-            Command::Import(import::Command::ConvertRecording) => self.convert_recording(),
-            Command::Import(import::Command::ConvertImages) => self.convert_images(),
-            Command::Session(session::Command::SaveAs(folder)) => self.save_as(folder),
-            Command::Session(session::Command::ListFolder(folder)) => self.list_folder(folder),
-            Command::Session(session::Command::OpenFolder(folder)) => self.open_folder(folder),
-
-            Command::Solve(solve::Command::Solve) => self.solve_again(),
-            Command::Solve(solve::Command::Cancel) => self.cancel_solve(),
-            Command::Solve(solve::Command::SetMethod(name)) => self.set_method(&name),
-            Command::Solve(solve::Command::SetKeepOutliers(keep)) => self.set_keep_outliers(keep),
-            Command::Solve(solve::Command::SetTipBox(chosen)) => self.set_tip_box(chosen),
-            Command::Solve(solve::Command::SetGoal(goal)) => self.set_goal(goal),
-            Command::Solve(solve::Command::SetOutlierLine(line_px)) => self.model.outlier_line_px = line_px,
-
-            Command::Track(track::Command::SetTracking(on)) => self.set_tracking(on),
-            Command::Track(track::Command::SetFollow(wish)) => self.set_follow(wish),
-            Command::Track(track::Command::MoveBoard(motion)) => self.move_board(motion),
-            Command::Track(track::Command::HideBoard(hidden)) => self.hide_board(hidden),
-            Command::Recording(recording::Command::OpenRerun) => self.open_rerun(),
-
-            Command::Export(export::Command::ChooseFormats(formats)) => self.model.export.chosen = formats,
-            Command::Export(export::Command::ShowFormat(format)) => self.model.export.shown = format,
-            Command::Export(export::Command::SetNames(names)) => self.set_export_names(names),
-            Command::Export(export::Command::SetFolder(folder)) => self.model.export.folder = folder,
-            Command::Export(export::Command::Export) => self.export(),
+            Command::ByHand(command) => by_hand::update::apply(cx, command),
+            Command::Capture(command) => capture::update::apply(model, workers, numbers, command),
+            Command::Connect(command) => connect::update::apply(cx, connector, command),
+            Command::Export(command) => export::update::apply(model, desk, command),
+            Command::Guided(command) => guided::update::apply(cx, command),
+            Command::Import(command) => import::update::apply(model, desk, numbers, reach, command),
+            Command::KeepOut(command) => keep_out::update::apply(model, workers, desk, command),
+            Command::Live(command) => live::update::apply(model, workers, command),
+            Command::Messages(command) => messages::update::apply(model, command),
+            Command::Motion(command) => motion::update::apply(cx, command),
+            Command::Recording(command) => recording::update::apply(recording.as_deref(), command),
+            Command::Scene(command) => scene::update::apply(model, command),
+            Command::Session(command) => session::update::apply(model, workers, desk, reach, command),
+            Command::Shell(command) => shell::update::apply(model, desk, command),
+            Command::Solve(command) => solve::update::apply(model, desk, numbers, command),
+            Command::Target(command) => target::update::apply(model, workers, desk, command),
+            Command::Taught(command) => taught::update::apply(cx, command),
+            Command::Track(command) => track::update::apply(model, workers, numbers, command),
         }
     }
 
     /// Takes in what happened.
     pub fn absorb(&mut self, event: impl Into<Event>) {
         let event = event.into();
-        self.record(&event);
+        let Self { cx, recording, reach, .. } = self;
+        if let Some(recording) = recording {
+            recording::update::note(recording.as_ref(), &cx.model, &cx.numbers, &event);
+        }
+        let Context { model, workers, desk, numbers } = cx;
         match event {
             Event::Tick { now_s } => {
-                self.model.now_s = now_s;
-                self.keep_keep_out(false);
-                self.stop_waits();
+                model.now_s = now_s;
+                keep_keep_out(model, desk, false);
+                stop_waits(model);
             }
-            Event::KeepOut(keep_out::Event::Standing(standing)) => self.standing_found(standing),
-            Event::KeepOut(keep_out::Event::Read(content)) => self.keep_out_read(*content),
-            Event::Connect(connect::Event::Link { link, state }) => self.link_changed(link, state),
-            Event::Connect(connect::Event::Robot(robot)) => {
-                self.model.trail.add(robot.base_from_tip.translation().into());
-                self.stop_seen(&robot);
-                if !robot.joints_rad.is_empty() {
-                    self.model.home.get_or_insert(robot.joints_rad);
-                }
-                self.model.robot = Some(robot);
-                self.model.robot_read_s = Some(self.model.now_s);
-            }
-            Event::Connect(connect::Event::NoRobot) => self.model.robot = None,
-            Event::Connect(connect::Event::Cell(facts)) => self.cell_found(*facts),
-            Event::Connect(connect::Event::Heard { severity, words }) => self.heard(severity, words),
-            Event::Motion(motion::Event::Stopped) => self.stopped(),
-            Event::Live(live::Event::Frame { info, dropped, images }) => {
-                self.model.dropped_frames = dropped;
-                // A frame out of a log has no pixels, and nothing to show.
-                if let Some(images) = images {
-                    self.model.frame = Some(LiveFrame { info, images });
-                }
-            }
-            Event::Live(live::Event::Detection(detection)) => {
-                if detection.corners.is_some() {
-                    self.model.board_seen_s = Some(self.model.now_s);
-                }
-                self.model.detection = Some(*detection);
-                self.look_by_hand();
-            }
-            Event::Motion(motion::Event::Moved { id, outcome }) => self.moved(id, outcome),
-            Event::Guided(guided::Event::Chosen { id, outcome }) => self.guided_chosen(id, outcome),
-            Event::ByHand(by_hand::Event::ViewChosen { number, choice }) => self.view_chosen(number, *choice),
-            Event::Taught(taught::Event::Planned { id, views }) => self.planned(id, views),
-            Event::Motion(motion::Event::JogEnded { why }) => self.jog_ended(why),
-            Event::Capture(capture::Event::Waits { number, wait }) => self.capture_waits(number, wait),
-            Event::Capture(capture::Event::Refused { number, refused }) => self.capture_refused(number, refused),
-            Event::Capture(capture::Event::Captured { number, id }) => {
-                self.captured(number, id);
-                self.forget_typed_pose();
-            }
-            Event::Session(session::Event::Document(state)) => self.document_changed(*state),
-            Event::Session(session::Event::Opened { exported }) => self.session_opened(exported),
-            Event::Session(session::Event::Failed { why }) => self.session_failed(why),
-            Event::Import(import::Event::NoSession(path)) => self.import(path),
-            Event::Import(import::Event::Progress { number, work }) => self.import_progress(number, work),
-            Event::Import(import::Event::Looked { number, found, trouble }) => {
-                self.recording_looked(number, found, trouble)
-            }
-            Event::Import(import::Event::Converted { number, converted }) => {
-                self.recording_converted(number, converted)
-            }
-            Event::Session(session::Event::Observed { id, target, observed }) => self.observed(id, target, observed),
-            Event::Session(session::Event::Review { id, images }) => self.reviewed(id, images),
-            Event::Session(session::Event::Folder(listing)) => self.model.folder = Some(listing),
-            Event::Session(session::Event::Recent(recent)) => self.model.recent = recent,
-            Event::Taught(taught::Event::Read { poses }) => self.poses_read(poses),
-            Event::Solve(solve::Event::Progress { job, stage, part }) => self.solve_progress(job, stage, part),
-            Event::Solve(solve::Event::Ended { job, outcome }) => self.solve_ended(job, outcome),
-            Event::Export(export::Event::Previews(previews)) => {
-                self.model.export.previews = previews.into_iter().collect()
-            }
-            Event::Export(export::Event::Written(written)) => self.written(written),
-            Event::Track(track::Event::Tracked(tracked)) => self.tracked(tracked),
-            Event::Track(track::Event::Failed { why }) => self.track_failed(why),
-            Event::Track(track::Event::Follow(status)) => self.follow_goes(status),
-            Event::Recording(recording::Event::Rerun(state)) => self.model.rerun = state,
-            Event::Recording(recording::Event::NoBrowser) => self.show_rerun_address(),
-            Event::Messages(messages::Event::Notice { severity, text }) => self.say(severity, text),
+            Event::ByHand(event) => by_hand::update::absorb(model, numbers, event),
+            Event::Capture(event) => capture::update::absorb(cx, event),
+            Event::Connect(event) => connect::update::absorb(cx, event),
+            Event::Export(event) => export::update::absorb(model, event),
+            Event::Guided(event) => guided::update::absorb(cx, event),
+            Event::Import(event) => import::update::absorb(model, desk, numbers, reach.as_ref(), event),
+            Event::KeepOut(event) => keep_out::update::absorb(model, workers, event),
+            Event::Live(event) => live::update::absorb(model, workers, numbers, event),
+            Event::Messages(event) => messages::update::absorb(model, event),
+            Event::Motion(event) => motion::update::absorb(cx, event),
+            Event::Recording(event) => recording::update::absorb(model, desk, event),
+            Event::Session(event) => session::update::absorb(cx, event),
+            Event::Solve(event) => solve::update::absorb(cx, event),
+            Event::Taught(event) => taught::update::absorb(cx, event),
+            Event::Track(event) => track::update::absorb(model, workers, numbers, event),
         }
-        self.guided_step();
-        self.guided_by_hand_step();
-        self.fit_scene();
+        let Context { model, workers, desk, numbers } = cx;
+        guided_step(model, workers, numbers);
+        guided_by_hand_step(model, desk, numbers);
+        fit_scene(model);
     }
 
     /// Has the settings written.
     pub fn write_settings(&mut self, settings: SettingsWrite) {
-        let asked = self.desk.files(FileTask::Settings(settings));
-        self.expect(text!("The settings were not written"), asked);
-    }
-
-    /// Tells the user when a worker did not take a request.
-    pub(crate) fn expect<Refused>(&mut self, failure: handeye_wording::Text, asked: Result<(), Refused>) {
-        if let Err(_refused) = asked {
-            let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
-            self.say(Severity::Warning, text);
-        }
+        let asked = self.cx.desk.files(FileTask::Settings(settings));
+        self.cx.model.say_if_refused(text!("The settings were not written"), asked);
     }
 }
 

@@ -88,7 +88,7 @@ fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() 
 
     app.apply(motion::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
-    let id = app.numbers.motion;
+    let id = app.cx.numbers.motion;
     app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
     assert!(app.model().asked.is_none(), "the second goes by itself");
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
@@ -116,7 +116,7 @@ fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
     model.source = driver();
     app.replace_model(model);
     app.apply(taught::Command::VerifyAtPlanned);
-    let id = app.numbers.motion;
+    let id = app.cx.numbers.motion;
     app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     assert!(app.model().asked.is_some() && app.model().sequence_runs);
     app.apply(motion::Command::Stop);
@@ -127,7 +127,7 @@ fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
     assert_eq!(app.model().asked, None, "it is there");
     robot.joints_rad[0] += 0.7;
     app.absorb(connect::Event::Robot(robot));
-    let id = app.numbers.motion;
+    let id = app.cx.numbers.motion;
     app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
     app.apply(motion::Command::GoHome);
     let asked = app.model().asked.clone().expect("it waits");

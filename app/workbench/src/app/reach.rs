@@ -90,6 +90,11 @@ impl Reach {
     }
 }
 
+/// What files in a folder that is opened may name: anything, where somebody sits at this machine.
+pub(crate) fn bounds_of(reach: Option<&Reach>, path: &Path) -> Bounds {
+    reach.map_or(Bounds::ANYWHERE, |reach| reach.bounds_of(path))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

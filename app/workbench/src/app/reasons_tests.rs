@@ -18,7 +18,7 @@ fn standing(app: &App, pane: Pane) -> String {
 }
 
 fn moved(app: &mut App, outcome: MotionOutcome) {
-    let id = app.numbers.motion;
+    let id = app.cx.numbers.motion;
     app.absorb(motion::Event::Moved { id, outcome });
 }
 
@@ -49,7 +49,7 @@ fn one_move_that_is_refused_is_a_pose_left_out_and_two_in_a_row_break_guided_cap
     assert!(app.model().sequence_runs && sequence.last_skipped() == Some(&Text::verbatim(MANUAL)), "{sequence:?}");
     choose(app);
     moved(app, MotionOutcome::Arrived);
-    let number = app.numbers.capture;
+    let number = app.cx.numbers.capture;
     let why = Text::verbatim("blurred");
     app.absorb(capture::Event::Refused {
         number,
@@ -72,14 +72,14 @@ fn a_sequence_that_is_broken_off_says_why_in_its_pane() {
     let app = &mut bench.app;
     app.replace_model(sample::solved());
     app.apply(taught::Command::VerifyAtPlanned);
-    let id = app.numbers.motion;
+    let id = app.cx.numbers.motion;
     app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     moved(app, MotionOutcome::Failed(Text::verbatim("The robot stopped: protective stop")));
     assert!(standing(app, Pane::Verify).ends_with("protective stop"), "{}", standing(app, Pane::Verify));
 
     app.apply(taught::Command::ContinueSequence);
     moved(app, MotionOutcome::Arrived);
-    let number = app.numbers.capture;
+    let number = app.cx.numbers.capture;
     let why = Text::verbatim("No images have come for 5 s");
     app.absorb(capture::Event::Refused {
         number,
@@ -95,7 +95,7 @@ fn poses_that_check_the_answer_are_gone_on_with_as_the_others_are() {
     let app = &mut bench.app;
     app.replace_model(sample::solved());
     app.apply(guided::Command::CalibrateForMe);
-    let sequence = app.model.sequence.as_mut().expect("a sequence");
+    let sequence = app.cx.model.sequence.as_mut().expect("a sequence");
     sequence.purpose = Some(CapturePurpose::Verify);
     let guided = sequence.guided.as_deref_mut().expect("guided");
     (guided.ending, guided.waits) = (Some(Ending::GoalReached { error_m: 3e-4 }), Waits::Nothing);

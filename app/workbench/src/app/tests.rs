@@ -12,12 +12,14 @@ use handeye_session::{CaptureId, Role};
 
 use super::*;
 use crate::by_hand::state::HandWaits;
+use crate::by_hand::update::captured_by_hand;
 use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
     ArmDoubt, ByHand, CapturePurpose, CaptureRefused, CellFacts, DepthScale, Dialog, FollowStatus, FollowWish, Home,
-    Jog, Link, LinkState, LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind,
+    JobId, Jog, Link, LinkState, LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind,
     RobotState, SceneView, SolveStatus, StopOutcome, ThemeChoice, WorkBox,
 };
+use crate::solve::update::seen;
 use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::worker::fake::{FakeCell, FakeMotions};
@@ -70,7 +72,7 @@ fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_addres
     }));
     let connected = LinkState::Connected { server: "a cell".to_owned(), address: "tcp://127.0.0.1:9".to_owned() };
     let panda = CellPaths::below("Panda");
-    bench.app.model.control = connected.clone();
+    bench.app.cx.model.control = connected.clone();
     bench.app.apply(connect::Command::SetObjects(panda.clone()));
     bench.app.apply(connect::Command::Reconnect);
     assert_eq!(made.lock().expect("whole").len(), 1, "the cell of the start goes on");
@@ -79,7 +81,7 @@ fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_addres
     bench.app.apply(connect::Command::Connect(address.clone()));
     let xarm = CellPaths::below("xArm");
     bench.app.apply(connect::Command::SetObjects(xarm.clone()));
-    bench.app.model.control = connected;
+    bench.app.cx.model.control = connected;
     bench.app.apply(connect::Command::Reconnect);
     let made = made.lock().expect("whole")[1..].to_vec();
     assert_eq!(made, [(address.clone(), panda), (address.clone(), xarm.clone()), (address, xarm)]);
@@ -216,17 +218,17 @@ fn commands_and_events_survive_being_written_down() {
 #[test]
 fn a_pose_that_cannot_be_reached_is_left_out_and_a_stop_ends_the_sequence() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.model.sequence_runs = true;
+    bench.app.cx.model.sequence_runs = true;
     let names = vec!["a".to_owned(), "b".to_owned()];
-    bench.app.model.sequence =
+    bench.app.cx.model.sequence =
         Some(PoseSequence { names, planned: None, purpose: None, outcomes: Vec::new(), began_s: 0.0, guided: None });
-    let id = bench.app.numbers.motion;
+    let id = bench.app.cx.numbers.motion;
     bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Refused(Text::verbatim("too far")) });
     let sequence = bench.app.model().sequence.clone().expect("the sequence");
     assert!(matches!(sequence.outcomes.as_slice(), [StopOutcome::Skipped(_), ..]), "{sequence:?}");
 
-    bench.app.model.sequence_runs = true;
-    let id = bench.app.numbers.motion;
+    bench.app.cx.model.sequence_runs = true;
+    let id = bench.app.cx.numbers.motion;
     bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Stopped });
     assert!(!bench.app.model().sequence_runs);
     assert_eq!(bench.app.model().motion, Motion::Idle);
@@ -237,11 +239,11 @@ fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_c
     let mut bench = bench(&FakeCell::new(0));
     bench.app.replace_model(sample::solved());
     bench.app.apply(taught::Command::VerifyAtPlanned);
-    let id = bench.app.numbers.motion;
+    let id = bench.app.cx.numbers.motion;
     bench.app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
-    let id = bench.app.numbers.motion;
+    let id = bench.app.cx.numbers.motion;
     bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Arrived });
-    let number = bench.app.numbers.capture;
+    let number = bench.app.cx.numbers.capture;
     let why = Text::verbatim("the simulation is paused");
     let refused = CaptureRefused { kind: RefusalKind::Paused, why, at_s: 3.0 };
     bench.app.absorb(capture::Event::Refused { number, refused });
@@ -264,8 +266,8 @@ fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_c
 
 /// The pose that is next is chosen as a worker chooses it.
 pub(super) fn choose(app: &mut App) {
-    let id = app.numbers.motion;
-    let guided = app.model.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("a guided sequence");
+    let id = app.cx.numbers.motion;
+    let guided = app.cx.model.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("a guided sequence");
     guided.waits = Waits::Choice;
     let proposal = Proposal {
         base_from_tip: Pose::identity(),
@@ -279,7 +281,7 @@ pub(super) fn choose(app: &mut App) {
     let why = Why::Gain { from_m: 1e-3, to_m: 9e-4, rotation_part: 0.5 };
     let step = ChosenStep::Next(Box::new(Next::Go { plan, why }));
     let guide = guided.guide.clone();
-    let chosen_at = app.model.robot.as_ref().expect("connected").joints_rad;
+    let chosen_at = app.cx.model.robot.as_ref().expect("connected").joints_rad;
     app.absorb(guided::Event::Chosen {
         id,
         outcome: Ok(Box::new(Choice { guide, step, views_left: Some(3), chosen_at })),
@@ -324,11 +326,11 @@ fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
     let judged_over = |app: &mut App| {
         app.apply(guided::Command::CalibrateForMe);
         // The answer that there is stands for the one from the present method.
-        app.model.solve.status = SolveStatus::Idle;
-        app.model.solve.fresh = true;
-        app.guided_step();
+        app.cx.model.solve.status = SolveStatus::Idle;
+        app.cx.model.solve.fresh = true;
+        guided_step(&mut app.cx.model, &app.cx.workers, &mut app.cx.numbers);
         assert_eq!(waits(app), Some(Waits::Choice));
-        let guided = app.model.sequence.as_ref().and_then(|it| it.guided.as_deref()).expect("a guided sequence");
+        let guided = app.cx.model.sequence.as_ref().and_then(|it| it.guided.as_deref()).expect("a guided sequence");
         guided.guide.options().tool_box
     };
     assert_eq!(judged_over(app), None);
@@ -410,18 +412,18 @@ fn only_a_capture_for_verification_checks_an_answer_by_hand() {
     let calibrates = of(&bench.app, Role::Calibration).expect("a capture in the fit");
     bench.app.absorb(capture::Event::Captured { number: 99, id: calibrates });
     assert_eq!(checked(&bench.app), Some(0));
-    bench.app.captured_by_hand(Some(Role::Verification));
+    captured_by_hand(&mut bench.app.cx.model, Some(Role::Verification));
     assert_eq!(checked(&bench.app), Some(1));
 }
 
 /// A view that is wanted, and a detection in which the board looks so.
 fn wanted_and_seen(app: &App) -> (Box<Wanted>, LiveDetection) {
-    let document = Arc::clone(&app.model.session.document);
-    let observations = app.seen(&document).observations;
-    let solved = app.model.solve.solved.clone().expect("solved");
+    let document = Arc::clone(&app.cx.model.session.document);
+    let observations = seen(&app.cx.model, &document).observations;
+    let solved = app.cx.model.solve.solved.clone().expect("solved");
     let known =
         Known { observations: &observations, calibration: Some(&solved.calibration), robot: None, elapsed_s: 0.0 };
-    let intrinsics = app.model.intrinsics().expect("calibrated");
+    let intrinsics = app.cx.model.intrinsics().expect("calibrated");
     let mut guide = HandGuide::new(GuidedOptions { goal_m: 1e-9, least_gain: 0.0, ..GuidedOptions::default() });
     let next = guide.next(&known, &Pose::identity(), &intrinsics, &CancelToken::default());
     let HandNext::Take(wanted) = next else { panic!("{next:?}") };
@@ -430,7 +432,7 @@ fn wanted_and_seen(app: &App) -> (Box<Wanted>, LiveDetection) {
         Corner::new(index, px.expect("before the camera"))
     };
     let corners = document.meta.target.points().into_iter().enumerate().map(corner).collect();
-    let detection = app.model.detection.clone().expect("seen");
+    let detection = app.cx.model.detection.clone().expect("seen");
     (wanted, LiveDetection { corners: Some(corners), ..detection })
 }
 
@@ -441,16 +443,16 @@ fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
     let app = &mut bench.app;
     app.replace_model(led(None));
     let (wanted, seen) = wanted_and_seen(app);
-    app.model.by_hand.as_mut().expect("led").wanted = Some(wanted);
+    app.cx.model.by_hand.as_mut().expect("led").wanted = Some(wanted);
     let stand = |app: &mut App, seen: &LiveDetection| {
         for _ in 0..2 {
-            app.absorb(Event::Tick { now_s: app.model.now_s + 0.5 });
+            app.absorb(Event::Tick { now_s: app.cx.model.now_s + 0.5 });
             app.absorb(live::Event::Detection(Box::new(seen.clone())));
         }
-        app.model.capture.is_some()
+        app.cx.model.capture.is_some()
     };
     assert!(stand(app, &seen), "at rest in a good view");
-    let number = app.numbers.capture;
+    let number = app.cx.numbers.capture;
     let why = Text::verbatim("too similar");
     let refused = CaptureRefused { kind: RefusalKind::TooSimilar, why, at_s: 3.0 };
     app.absorb(capture::Event::Refused { number, refused });
@@ -465,18 +467,18 @@ fn keeping_all_views_is_another_question_and_is_solved_at_once() {
     let mut bench = bench(&FakeCell::new(0));
     bench.app.apply(solve::Command::SetKeepOutliers(true));
     assert!(bench.app.model().keep_outliers);
-    let asked = bench.app.numbers.job;
+    let asked = bench.app.cx.numbers.job;
     bench.app.apply(solve::Command::SetKeepOutliers(true));
-    assert_eq!(bench.app.numbers.job, asked, "the same question is not asked twice");
+    assert_eq!(bench.app.cx.numbers.job, asked, "the same question is not asked twice");
     bench.app.apply(solve::Command::SetKeepOutliers(false));
-    assert_ne!(bench.app.numbers.job, asked);
+    assert_ne!(bench.app.cx.numbers.job, asked);
 }
 
 #[test]
 fn an_answer_to_an_earlier_question_is_not_shown() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.numbers.job = JobId(7);
-    bench.app.model.solve.status = SolveStatus::Idle;
+    bench.app.cx.numbers.job = JobId(7);
+    bench.app.cx.model.solve.status = SolveStatus::Idle;
     let outcome = crate::solve::SolveOutcome::Failed(Text::verbatim("old"));
     bench.app.absorb(solve::Event::Ended { job: JobId(6), outcome });
     assert_eq!(bench.app.model().solve.status, SolveStatus::Idle);
@@ -488,7 +490,7 @@ fn an_answer_of_the_session_before_does_not_get_into_another_one() {
     let mut state = bench.app.model().session.clone();
     state.folder = Some(PathBuf::from("first"));
     bench.app.absorb(session::Event::Document(Box::new(state.clone())));
-    let job = bench.app.numbers.job;
+    let job = bench.app.cx.numbers.job;
     // Its captures have yet to be looked at, so that nothing new is solved before the old answer comes.
     state.folder = Some(PathBuf::from("second"));
     state.document = sample::captured().session.document;
@@ -508,14 +510,14 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     bench.app.replace_model(sample::solved());
     bench.app.apply(taught::Command::VerifyAtPlanned);
     assert!(bench.app.model().planning);
-    let id = bench.app.numbers.motion;
+    let id = bench.app.cx.numbers.motion;
     bench.app.apply(motion::Command::Stop);
     assert!(!bench.app.model().planning);
     bench.app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     assert!(!bench.app.model().sequence_runs, "it was stopped");
 
     bench.app.apply(taught::Command::VerifyAtPlanned);
-    let id = bench.app.numbers.motion;
+    let id = bench.app.cx.numbers.motion;
     bench.app.absorb(taught::Event::Planned { id, views: Ok(vec![[0.1; 6].into(); 3]) });
     let sequence = bench.app.model().sequence.clone().expect("a sequence");
     assert!(bench.app.model().sequence_runs && !bench.app.model().planning);
@@ -526,10 +528,10 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     assert!(!bench.app.model().sequence_runs);
 
     bench.app.apply(taught::Command::VerifyAtPlanned);
-    let id = bench.app.numbers.motion;
+    let id = bench.app.cx.numbers.motion;
     // A motion that is asked for meanwhile is refused, and the poses still come.
     bench.app.apply(motion::Command::GoToCapture(CaptureId(1)));
-    let other = bench.app.numbers.motion;
+    let other = bench.app.cx.numbers.motion;
     bench.app.absorb(motion::Event::Moved { id: other, outcome: MotionOutcome::Refused(Text::verbatim("busy")) });
     assert!(bench.app.model().planning);
     bench.app.absorb(taught::Event::Planned { id, views: Err(Text::verbatim("the board is too far")) });
@@ -544,7 +546,7 @@ fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning()
     model.track.follow = FollowStatus::Off;
     bench.app.replace_model(model);
     bench.app.apply(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
-    let id = bench.app.numbers.follow.expect("it follows");
+    let id = bench.app.cx.numbers.follow.expect("it follows");
     bench
         .app
         .absorb(motion::Event::Moved { id, outcome: MotionOutcome::Failed(Text::verbatim("joint 3 is at its limit")) });
@@ -554,7 +556,7 @@ fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning()
 
     bench.app.apply(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
     assert_eq!(bench.app.model().track.follow, FollowStatus::Off, "the reason before is no longer so");
-    let id = bench.app.numbers.follow.expect("it follows");
+    let id = bench.app.cx.numbers.follow.expect("it follows");
     bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Stopped });
     assert_eq!(bench.app.model().messages.newest().map(|it| it.home), Some(Home::StatusLine));
 }

@@ -6,7 +6,7 @@
 
 pub mod command;
 pub mod state;
-mod update;
+pub(crate) mod update;
 pub(crate) mod worker;
 
 pub use command::{Command, Event};

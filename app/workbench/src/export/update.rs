@@ -1,66 +1,94 @@
 //! Exports.
 
-use handeye_session::CaptureRecord;
+use handeye_export::ExportNames;
+use handeye_session::{CaptureRecord, Edit};
 
-use crate::app::App;
-use crate::model::{Pane, Severity, Written, exports_of};
-use crate::worker::{ExportJob, FileTask};
+use super::command::{Command, Event};
+use crate::model::{Model, Pane, Severity, Written, exports_of};
+use crate::session::update::edit;
+use crate::worker::{ExportJob, FileTask, SessionThreads};
 use handeye_wording::text;
 
-impl App {
-    fn export_job(&self) -> Option<Box<ExportJob>> {
-        let solved = self.model.solve.current()?;
-        let views = solved
-            .captures
-            .iter()
-            .filter_map(|id| self.model.document().capture(*id))
-            .filter(|capture| capture.is_in_use())
-            .filter_map(CaptureRecord::export_view)
-            .collect();
-        let names = self.model.export.names.clone();
-        Some(Box::new(ExportJob { result: solved.result.clone(), names, views }))
+/// Does what is wanted of exports.
+pub(crate) fn apply(model: &mut Model, desk: &SessionThreads, command: Command) {
+    match command {
+        Command::ChooseFormats(formats) => model.export.chosen = formats,
+        Command::ShowFormat(format) => model.export.shown = format,
+        Command::SetNames(names) => set_export_names(model, desk, names),
+        Command::SetFolder(folder) => model.export.folder = folder,
+        Command::Export => export(model, desk),
     }
+}
 
-    /// Has the text of every format made for the present result.
-    pub(crate) fn preview_exports(&mut self) {
-        self.model.export.previews.clear();
-        if let Some(job) = self.export_job() {
-            let asked = self.desk.files(FileTask::Preview(job));
-            self.expect(text!("The exports are not shown"), asked);
+/// Takes in what was written.
+pub(crate) fn absorb(model: &mut Model, event: Event) {
+    match event {
+        Event::Previews(previews) => model.export.previews = previews.into_iter().collect(),
+        Event::Written(files) => written(model, files),
+    }
+}
+
+fn export_job(model: &Model) -> Option<Box<ExportJob>> {
+    let solved = model.solve.current()?;
+    let views = solved
+        .captures
+        .iter()
+        .filter_map(|id| model.document().capture(*id))
+        .filter(|capture| capture.is_in_use())
+        .filter_map(CaptureRecord::export_view)
+        .collect();
+    let names = model.export.names.clone();
+    Some(Box::new(ExportJob { result: solved.result.clone(), names, views }))
+}
+
+/// Has the text of every format made for the present result.
+pub(crate) fn preview_exports(model: &mut Model, desk: &SessionThreads) {
+    model.export.previews.clear();
+    if let Some(job) = export_job(model) {
+        let asked = desk.files(FileTask::Preview(job));
+        model.say_if_refused(text!("The exports are not shown"), asked);
+    }
+}
+
+fn export(model: &mut Model, desk: &SessionThreads) {
+    let Some(job) = export_job(model) else {
+        model.say(Severity::Warning, text!("There is nothing to export yet: solve first"));
+        return;
+    };
+    let state = &model.export;
+    let formats: Vec<String> = state.chosen.iter().cloned().collect();
+    let folder = state.folder.clone().or_else(|| model.session.folder.as_deref().map(exports_of));
+    let Some(folder) = folder.filter(|_| !formats.is_empty()) else {
+        model.say(Severity::Warning, text!("Choose at least one format, and a folder"));
+        return;
+    };
+    let asked = desk.files(FileTask::Export { job, formats, folder });
+    model.export.writing = asked.is_ok();
+    model.say_if_refused(text!("Nothing was exported"), asked);
+}
+
+fn written(model: &mut Model, written: Written) {
+    model.export.writing = false;
+    match &written.files {
+        Ok(files) => {
+            model.export.is_present = true;
+            let count = files.len();
+            let said = text!("{count} {count|file|files} written, read back and compared", count = count);
+            model.say_in(Pane::Export, Severity::Info, said);
+        }
+        Err(why) => {
+            let said = text!("Nothing was exported: {why}", why = why);
+            model.say_in(Pane::Export, Severity::Error, said);
         }
     }
+    model.export.written = Some(written);
+}
 
-    pub(crate) fn export(&mut self) {
-        let Some(job) = self.export_job() else {
-            self.say(Severity::Warning, text!("There is nothing to export yet: solve first"));
-            return;
-        };
-        let state = &self.model.export;
-        let formats: Vec<String> = state.chosen.iter().cloned().collect();
-        let folder = state.folder.clone().or_else(|| self.model.session.folder.as_deref().map(exports_of));
-        let Some(folder) = folder.filter(|_| !formats.is_empty()) else {
-            self.say(Severity::Warning, text!("Choose at least one format, and a folder"));
-            return;
-        };
-        let asked = self.desk.files(FileTask::Export { job, formats, folder });
-        self.model.export.writing = asked.is_ok();
-        self.expect(text!("Nothing was exported"), asked);
+fn set_export_names(model: &mut Model, desk: &SessionThreads, names: ExportNames) {
+    match serde_json::to_value(&names) {
+        Ok(value) => edit(model, desk, Edit::SetExportNames(value)),
+        Err(error) => model.say(Severity::Error, text!("The names cannot be kept: {why}", why = error.to_string())),
     }
-
-    pub(crate) fn written(&mut self, written: Written) {
-        self.model.export.writing = false;
-        match &written.files {
-            Ok(files) => {
-                self.model.export.is_present = true;
-                let count = files.len();
-                let said = text!("{count} {count|file|files} written, read back and compared", count = count);
-                self.say_in(Pane::Export, Severity::Info, said);
-            }
-            Err(why) => {
-                let said = text!("Nothing was exported: {why}", why = why);
-                self.say_in(Pane::Export, Severity::Error, said);
-            }
-        }
-        self.model.export.written = Some(written);
-    }
+    model.export.names = names;
+    preview_exports(model, desk);
 }

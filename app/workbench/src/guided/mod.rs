@@ -5,6 +5,6 @@
 
 pub mod command;
 pub mod state;
-mod update;
+pub(crate) mod update;
 
 pub use command::{Command, Event};

@@ -7,11 +7,12 @@ use std::sync::Arc;
 use handeye_plan::Surroundings;
 use handeye_plan::surroundings::{KeepOutFile, SurroundingsError};
 
+use super::command::{Command, Event};
 use super::state::KeepOut;
-use crate::app::App;
+use crate::model::Model;
 use crate::model::Severity;
 use crate::text::Text;
-use crate::worker::FileTask;
+use crate::worker::{FileTask, SessionThreads, Workers};
 use handeye_wording::text;
 
 /// How long after the last change they are written \[s\]: a value that is dragged changes with every frame.
@@ -40,68 +41,83 @@ pub(crate) fn opened(file: Option<PathBuf>) -> (KeepOut, Option<Text>) {
     }
 }
 
-impl App {
-    pub(crate) fn set_keep_out(&mut self, content: KeepOutFile) {
-        self.model.keep_out.set(content);
-        self.model.keep_out.unwritten_since_s = Some(self.model.now_s);
-        self.send_keep_out();
+/// Does what is wanted of the boxes.
+pub(crate) fn apply(model: &mut Model, workers: &Workers, desk: &SessionThreads, command: Command) {
+    match command {
+        Command::Set(content) => set_keep_out(model, workers, *content),
+        Command::Import(file) => import_keep_out(model, desk, file),
+        Command::Export(file) => export_keep_out(model, desk, file),
     }
+}
 
-    /// Has the arm keep to them.
-    pub(crate) fn send_keep_out(&self) {
-        self.workers.keep_out(Arc::clone(&self.model.keep_out.around));
+/// Takes in what stands around.
+pub(crate) fn absorb(model: &mut Model, workers: &Workers, event: Event) {
+    match event {
+        Event::Standing(standing) => standing_found(model, standing),
+        Event::Read(content) => keep_out_read(model, workers, *content),
     }
+}
 
-    /// Whether the arm keeps out of them, and of what else. That it does not is said once.
-    pub(crate) fn standing_found(&mut self, standing: Result<Arc<Surroundings>, Text>) {
-        let keep_out = &mut self.model.keep_out;
-        match standing {
-            Ok(standing) => {
-                keep_out.standing = Some(standing);
-                keep_out.unkept = None;
-            }
-            Err(why) => {
-                let said = text!("The arm is not kept out of the boxes: {why}", why = why);
-                let is_news = keep_out.unkept.as_ref() != Some(&said) && !keep_out.content.boxes.is_empty();
-                keep_out.unkept = Some(said.clone());
-                if is_news {
-                    self.say(Severity::Warning, said);
-                }
+fn set_keep_out(model: &mut Model, workers: &Workers, content: KeepOutFile) {
+    model.keep_out.set(content);
+    model.keep_out.unwritten_since_s = Some(model.now_s);
+    send_keep_out(model, workers);
+}
+
+/// Has the arm keep to them.
+pub(crate) fn send_keep_out(model: &Model, workers: &Workers) {
+    workers.keep_out(Arc::clone(&model.keep_out.around));
+}
+
+/// Whether the arm keeps out of them, and of what else. That it does not is said once.
+fn standing_found(model: &mut Model, standing: Result<Arc<Surroundings>, Text>) {
+    let keep_out = &mut model.keep_out;
+    match standing {
+        Ok(standing) => {
+            keep_out.standing = Some(standing);
+            keep_out.unkept = None;
+        }
+        Err(why) => {
+            let said = text!("The arm is not kept out of the boxes: {why}", why = why);
+            let is_news = keep_out.unkept.as_ref() != Some(&said) && !keep_out.content.boxes.is_empty();
+            keep_out.unkept = Some(said.clone());
+            if is_news {
+                model.say(Severity::Warning, said);
             }
         }
     }
+}
 
-    pub(crate) fn import_keep_out(&mut self, file: PathBuf) {
-        let asked = self.desk.files(FileTask::ReadKeepOut(file));
-        self.expect(text!("The boxes were not read"), asked);
-    }
+fn import_keep_out(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
+    let asked = desk.files(FileTask::ReadKeepOut(file));
+    model.say_if_refused(text!("The boxes were not read"), asked);
+}
 
-    /// The boxes of a file come in place of those that there are.
-    pub(crate) fn keep_out_read(&mut self, content: KeepOutFile) {
-        let count = content.boxes.len();
-        self.set_keep_out(content);
-        self.say(Severity::Info, text!("The arm keeps out of {count} {count|box|boxes} of the file", count = count));
-    }
+/// The boxes of a file come in place of those that there are.
+fn keep_out_read(model: &mut Model, workers: &Workers, content: KeepOutFile) {
+    let count = content.boxes.len();
+    set_keep_out(model, workers, content);
+    model.say(Severity::Info, text!("The arm keeps out of {count} {count|box|boxes} of the file", count = count));
+}
 
-    pub(crate) fn export_keep_out(&mut self, file: PathBuf) {
-        let text = self.model.keep_out.content.to_toml();
-        let asked = self.desk.files(FileTask::WriteKeepOut { file, text, is_wished: true });
-        self.expect(text!("The boxes were not written"), asked);
-    }
+fn export_keep_out(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
+    let text = model.keep_out.content.to_toml();
+    let asked = desk.files(FileTask::WriteKeepOut { file, text, is_wished: true });
+    model.say_if_refused(text!("The boxes were not written"), asked);
+}
 
-    /// Keeps them in their file once nobody is changing them any longer, or at once.
-    pub(crate) fn keep_keep_out(&mut self, at_once: bool) {
-        let keep_out = &mut self.model.keep_out;
-        let Some(since_s) = keep_out.unwritten_since_s else { return };
-        if !at_once && self.model.now_s < since_s + WRITTEN_AFTER_S {
-            return;
-        }
-        keep_out.unwritten_since_s = None;
-        let Some(file) = keep_out.file.clone() else { return };
-        let text = keep_out.content.to_toml();
-        let asked = self.desk.files(FileTask::WriteKeepOut { file, text, is_wished: false });
-        self.expect(text!("The boxes were not written"), asked);
+/// Keeps them in their file once nobody is changing them any longer, or at once.
+pub(crate) fn keep_keep_out(model: &mut Model, desk: &SessionThreads, at_once: bool) {
+    let keep_out = &mut model.keep_out;
+    let Some(since_s) = keep_out.unwritten_since_s else { return };
+    if !at_once && model.now_s < since_s + WRITTEN_AFTER_S {
+        return;
     }
+    keep_out.unwritten_since_s = None;
+    let Some(file) = keep_out.file.clone() else { return };
+    let text = keep_out.content.to_toml();
+    let asked = desk.files(FileTask::WriteKeepOut { file, text, is_wished: false });
+    model.say_if_refused(text!("The boxes were not written"), asked);
 }
 
 /// Writes them, as a whole or not at all.

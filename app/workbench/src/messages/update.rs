@@ -1,22 +1,44 @@
 //! What the user is told.
 
-use crate::app::App;
-use crate::model::{Home, Pane, Severity};
+use super::command::{Command, Event};
+use crate::model::{Home, Model, Pane, Severity};
 use crate::text::Text;
+use handeye_wording::text;
 
-impl App {
+/// Does what is wanted of messages.
+pub(crate) fn apply(model: &mut Model, command: Command) {
+    match command {
+        Command::Dismiss(number) => model.messages.dismiss(number),
+    }
+}
+
+/// Takes in what there is to tell.
+pub(crate) fn absorb(model: &mut Model, event: Event) {
+    let Event::Notice { severity, text } = event;
+    model.say(severity, text);
+}
+
+impl Model {
     /// Shows what a pane says for as long as it is so, and keeps it.
     pub(crate) fn say_in(&mut self, pane: Pane, severity: Severity, text: Text) {
-        self.model.messages.say_at(Home::Pane(pane), severity, text, self.model.now_s);
+        self.messages.say_at(Home::Pane(pane), severity, text, self.now_s);
     }
 
     /// Keeps what the card below the steps says of the connection.
     pub(crate) fn say_of_connection(&mut self, severity: Severity, text: Text) {
-        self.model.messages.say_at(Home::Connection, severity, text, self.model.now_s);
+        self.messages.say_at(Home::Connection, severity, text, self.now_s);
     }
 
     /// Shows a message and keeps it.
     pub(crate) fn say(&mut self, severity: Severity, text: Text) {
-        self.model.messages.say(severity, text, self.model.now_s);
+        self.messages.say(severity, text, self.now_s);
+    }
+
+    /// Tells the user when a worker did not take a request.
+    pub(crate) fn say_if_refused<Refused>(&mut self, failure: Text, asked: Result<(), Refused>) {
+        if let Err(_refused) = asked {
+            let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
+            self.say(Severity::Warning, text);
+        }
     }
 }

@@ -3,9 +3,10 @@
 use handeye_driver::{Place, RestWatch};
 use handeye_link::moved_text;
 
-use crate::app::App;
-use crate::model::{Moves, RobotState, Severity, Simulation};
+use crate::capture::update::cancel_capture;
+use crate::model::{Model, Motion, Moves, RobotState, Severity, Simulation};
 use crate::text::Text;
+use crate::worker::Workers;
 use handeye_wording::text;
 
 /// So long \[s\] an arm has to come to rest: as a driver has for its own answer.
@@ -18,60 +19,88 @@ pub struct Stopping {
     watch: RestWatch,
 }
 
-impl App {
-    /// The arm was told to stop. Whether it did is for its states to say.
-    pub(crate) fn watch_stop(&mut self) {
-        self.model.stop_pending = true;
-        self.model.stopping = Some(Stopping { since_s: self.model.now_s, watch: RestWatch::default() });
-        if let Some(robot) = self.model.robot.clone() {
-            self.stop_seen(&robot);
-        }
+/// The arm was told to stop. Whether it did is for its states to say.
+fn watch_stop(model: &mut Model) {
+    model.stop_pending = true;
+    model.stopping = Some(Stopping { since_s: model.now_s, watch: RestWatch::default() });
+    if let Some(robot) = model.robot.clone() {
+        stop_seen(model, &robot);
     }
+}
 
-    /// A state has come.
-    pub(crate) fn stop_seen(&mut self, robot: &RobotState) {
-        let Some(stopping) = &mut self.model.stopping else { return };
-        let is_news = stopping.watch.newest().is_none_or(|newest| newest.stamp_s != robot.sim_time_s);
-        // In a simulation without time nothing moves.
-        if robot.simulation != Simulation::Running || is_news && stopping.watch.take(place(robot)) {
-            self.stop_is_over(Severity::Info, text!("Arm stopped: every joint stays where it is"));
-        }
+/// A state has come.
+pub(crate) fn stop_seen(model: &mut Model, robot: &RobotState) {
+    let Some(stopping) = &mut model.stopping else { return };
+    let is_news = stopping.watch.newest().is_none_or(|newest| newest.stamp_s != robot.sim_time_s);
+    // In a simulation without time nothing moves.
+    if robot.simulation != Simulation::Running || is_news && stopping.watch.take(place(robot)) {
+        stop_is_over(model, Severity::Info, text!("Arm stopped: every joint stays where it is"));
     }
+}
 
-    /// Time has passed.
-    pub(crate) fn stop_waits(&mut self) {
-        let Some(stopping) = self.model.stopping else { return };
-        if self.model.now_s - stopping.since_s < PATIENCE_S {
-            return;
-        }
-        let (severity, said) = match (stopping.watch.stands(), stopping.watch.moved()) {
-            (Some(true), _) => (Severity::Info, text!("Arm stopped: every joint stays where it is")),
-            (Some(false), Some(moved)) => (
-                Severity::Error,
-                text!(
-                    "The arm was told to stop and still moves: {moved} since. Use its own emergency stop",
-                    moved = moved_text(&moved, |joint| Some(self.model.joint_kind(joint)))
-                ),
+/// Time has passed.
+pub(crate) fn stop_waits(model: &mut Model) {
+    let Some(stopping) = model.stopping else { return };
+    if model.now_s - stopping.since_s < PATIENCE_S {
+        return;
+    }
+    let (severity, said) = match (stopping.watch.stands(), stopping.watch.moved()) {
+        (Some(true), _) => (Severity::Info, text!("Arm stopped: every joint stays where it is")),
+        (Some(false), Some(moved)) => (
+            Severity::Error,
+            text!(
+                "The arm was told to stop and still moves: {moved} since. Use its own emergency stop",
+                moved = moved_text(&moved, |joint| Some(model.joint_kind(joint)))
             ),
-            // A simulation that somebody holds.
-            _ if self.model.moves() == Moves::Freely && self.model.robot.is_some() => {
-                (Severity::Info, text!("Arm stopped: every joint stays where it is"))
-            }
-            _ => (
-                Severity::Error,
-                text!(
-                    "The arm was told to stop, and it is not known whether it has: no state has come since. Look at the arm"
-                ),
+        ),
+        // A simulation that somebody holds.
+        _ if model.moves() == Moves::Freely && model.robot.is_some() => {
+            (Severity::Info, text!("Arm stopped: every joint stays where it is"))
+        }
+        _ => (
+            Severity::Error,
+            text!(
+                "The arm was told to stop, and it is not known whether it has: no state has come since. Look at the arm"
             ),
-        };
-        self.stop_is_over(severity, said);
-    }
+        ),
+    };
+    stop_is_over(model, severity, said);
+}
 
-    fn stop_is_over(&mut self, severity: Severity, said: Text) {
-        self.model.stopping = None;
-        self.model.stop_pending = false;
-        self.say(severity, said);
+fn stop_is_over(model: &mut Model, severity: Severity, said: Text) {
+    model.stopping = None;
+    model.stop_pending = false;
+    model.say(severity, said);
+}
+
+pub(crate) fn stop(model: &mut Model, workers: &Workers) {
+    workers.press_stop();
+    stop_asked(model, workers);
+}
+
+pub(crate) fn stop_asked(model: &mut Model, workers: &Workers) {
+    model.sequence_runs = false;
+    model.asked = None;
+    model.planning = false;
+    cancel_capture(model, workers);
+    // It may be done already: only its report is not here yet.
+    model.stop_pending = workers.stop_line().is_pressed();
+    if model.control.is_connected() {
+        model.say(Severity::Info, text!("Stopping the arm…"));
+    } else {
+        model.say(
+            Severity::Error,
+            text!(
+                "The arm cannot be reached: use its own emergency stop. It is stopped as soon as the connection is \
+                 back"
+            ),
+        );
     }
+}
+
+pub(crate) fn stopped(model: &mut Model) {
+    model.motion = Motion::Idle;
+    watch_stop(model);
 }
 
 fn place(robot: &RobotState) -> Place {

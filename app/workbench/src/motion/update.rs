@@ -4,138 +4,164 @@ use handeye_arm::JointValues;
 use handeye_geometry::frames::{Camera, Pose, Tip};
 use handeye_session::CaptureId;
 
-use crate::app::App;
-use crate::model::{Jog, JogStep, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
+use super::command::{Command, Event};
+use crate::app::{Context, Numbers};
+use crate::model::{Jog, JogStep, Model, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
+use crate::motion::ask::{confirm_move, go_home, may_set_out, set_confirm_moves, set_out, skip_move};
+use crate::motion::rest::{stop, stopped};
+use crate::taught::sequence::{plan_refused, sequence_moved};
 use crate::text::Text;
+use crate::track::update::follow_ended;
+use crate::worker::Workers;
 use handeye_wording::text;
 
-impl App {
-    /// Moves the arm to a place that the words name.
-    pub(crate) fn start_motion(&mut self, goal: MotionGoal, what: Text) {
-        self.model.asked = None;
-        self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
-        let id = self.numbers.motion;
-        let request = MotionRequest { id, goal, speed: self.model.speed() };
-        self.model.messages.is_over_in(Pane::Jog);
-        match self.workers.move_to(request) {
-            Ok(()) => {
-                self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
-            }
-            Err(busy) => {
-                self.moved(id, MotionOutcome::Failed(busy.into()));
-            }
+/// Does what is wanted of the arm.
+pub(crate) fn apply(cx: &mut Context, command: Command) {
+    match command {
+        Command::Stop => stop(&mut cx.model, &cx.workers),
+        Command::Move { goal, what } => start_motion(cx, goal, what),
+        Command::Jog(jog) => press_jog(&mut cx.model, &cx.workers, &mut cx.numbers, jog),
+        Command::JogHeld(jog) => hold_jog(&mut cx.model, &cx.workers, jog),
+        Command::JogReleased => cx.workers.release_jog(),
+        Command::SetJog(settings) => cx.model.view.jog = settings,
+        Command::GoHome => go_home(cx),
+        Command::GoToCapture(id) => go_to_capture(cx, id),
+        Command::ConfirmMove => confirm_move(cx),
+        Command::SkipMove => skip_move(cx),
+        Command::SetConfirmMoves(confirm) => set_confirm_moves(cx, confirm),
+    }
+}
+
+/// Takes in what the arm did.
+pub(crate) fn absorb(cx: &mut Context, event: Event) {
+    match event {
+        Event::Stopped => stopped(&mut cx.model),
+        Event::Moved { id, outcome } => moved(cx, id, outcome),
+        Event::JogEnded { why } => jog_ended(&mut cx.model, why),
+    }
+}
+
+/// Moves the arm to a place that the words name.
+pub(crate) fn start_motion(cx: &mut Context, goal: MotionGoal, what: Text) {
+    cx.model.asked = None;
+    cx.numbers.motion = MotionId(cx.numbers.motion.0 + 1);
+    let id = cx.numbers.motion;
+    let request = MotionRequest { id, goal, speed: cx.model.speed() };
+    cx.model.messages.is_over_in(Pane::Jog);
+    match cx.workers.move_to(request) {
+        Ok(()) => {
+            cx.model.motion = Motion::Moving { id, what, since_s: cx.model.now_s };
+        }
+        Err(busy) => {
+            moved(cx, id, MotionOutcome::Failed(busy.into()));
         }
     }
+}
 
-    pub(crate) fn go_to_capture(&mut self, id: CaptureId) {
-        if !self.may_set_out() {
-            return;
-        }
-        let Some(capture) = self.model.document().capture(id) else { return };
-        let joints = capture.joints_rad.as_deref().and_then(|joints| JointValues::try_from(joints).ok());
-        let of_arm = self.model.cell.as_ref().map(|cell| cell.joints.len());
-        // Joints bring the arm back exactly; a recorded session may have the pose alone, or be of another arm.
-        let joints = joints.filter(|joints| of_arm.is_none_or(|count| count == joints.len()));
-        let goal = joints.map(MotionGoal::Joints).or(capture.base_from_tip.map(MotionGoal::Tip));
-        let Some(goal) = goal else {
-            let why = text!("Capture {id} has no pose of the robot", id = id);
-            return self.say_in(Pane::Jog, Severity::Warning, why);
-        };
-        self.set_out(goal, text!("pose of capture {id}", id = id));
+fn go_to_capture(cx: &mut Context, id: CaptureId) {
+    if !may_set_out(&mut cx.model) {
+        return;
     }
+    let Some(capture) = cx.model.document().capture(id) else { return };
+    let joints = capture.joints_rad.as_deref().and_then(|joints| JointValues::try_from(joints).ok());
+    let of_arm = cx.model.cell.as_ref().map(|cell| cell.joints.len());
+    // Joints bring the arm back exactly; a recorded session may have the pose alone, or be of another arm.
+    let joints = joints.filter(|joints| of_arm.is_none_or(|count| count == joints.len()));
+    let goal = joints.map(MotionGoal::Joints).or(capture.base_from_tip.map(MotionGoal::Tip));
+    let Some(goal) = goal else {
+        let why = text!("Capture {id} has no pose of the robot", id = id);
+        return cx.model.say_in(Pane::Jog, Severity::Warning, why);
+    };
+    set_out(cx, goal, text!("pose of capture {id}", id = id));
+}
 
-    pub(crate) fn moved(&mut self, id: MotionId, outcome: MotionOutcome) {
-        let what = match &self.model.motion {
-            Motion::Moving { id: moving, what, .. } if *moving == id => Some(what.clone()),
-            _ => None,
-        };
-        if what.is_some() {
-            self.model.motion = Motion::Idle;
+pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
+    let what = match &cx.model.motion {
+        Motion::Moving { id: moving, what, .. } if *moving == id => Some(what.clone()),
+        _ => None,
+    };
+    if what.is_some() {
+        cx.model.motion = Motion::Idle;
+    }
+    let what = what.unwrap_or_else(|| text!("the goal"));
+    if cx.model.planning && cx.numbers.plan == Some(id) {
+        return plan_refused(&mut cx.model, &outcome);
+    }
+    if cx.numbers.follow == Some(id) {
+        return follow_ended(&mut cx.model, &mut cx.numbers, outcome);
+    }
+    match &outcome {
+        MotionOutcome::Arrived => {}
+        MotionOutcome::Stopped => {
+            cx.model.say_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
         }
-        let what = what.unwrap_or_else(|| text!("the goal"));
-        if self.model.planning && self.numbers.plan == Some(id) {
-            return self.plan_refused(&outcome);
+        MotionOutcome::Refused(why) => {
+            let why = why.clone();
+            let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
+            cx.model.say_in(Pane::Jog, Severity::Warning, said);
         }
-        if self.numbers.follow == Some(id) {
-            return self.follow_ended(outcome);
-        }
-        match &outcome {
-            MotionOutcome::Arrived => {}
-            MotionOutcome::Stopped => {
-                self.say_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
-            }
-            MotionOutcome::Refused(why) => {
-                let why = why.clone();
-                let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
-                self.say_in(Pane::Jog, Severity::Warning, said);
-            }
-            MotionOutcome::Unreached(why) | MotionOutcome::Failed(why) | MotionOutcome::Held(why) => {
-                let said = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
-                self.say_in(Pane::Jog, Severity::Error, said);
-            }
-        }
-        // What an earlier motion still has to say does not move a sequence on.
-        if self.model.sequence_runs && id == self.numbers.motion {
-            self.sequence_moved(&outcome);
+        MotionOutcome::Unreached(why) | MotionOutcome::Failed(why) | MotionOutcome::Held(why) => {
+            let said = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
+            cx.model.say_in(Pane::Jog, Severity::Error, said);
         }
     }
+    // What an earlier motion still has to say does not move a sequence on.
+    if cx.model.sequence_runs && id == cx.numbers.motion {
+        sequence_moved(cx, &outcome);
+    }
+}
 
-    /// A press of a jog button: one step, or the beginning of holding it.
-    pub(crate) fn jog(&mut self, jog: Jog) {
-        self.model.messages.is_over_in(Pane::Jog);
-        match self.model.jog_step() {
-            JogStep::Hold => {
-                self.hold_jog(jog);
-                self.model.motion = Motion::Jogging(jog);
-            }
-            JogStep::Step { metres, radians } => {
-                self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
-                let id = self.numbers.motion;
-                let speed = self.model.speed();
-                let length = if jog.is_length(|joint| self.model.joint_kind(joint)) { metres } else { radians };
-                match self.workers.jog_step(id, jog, length, speed, self.camera_on_tip()) {
-                    Ok(()) => {
-                        let (what, since_s) = (text!("the next step"), self.model.now_s);
-                        self.model.motion = Motion::Moving { id, what, since_s };
-                    }
-                    Err(busy) => self.say_in(Pane::Jog, Severity::Warning, busy.into()),
+/// A press of a jog button: one step, or the beginning of holding it.
+fn press_jog(model: &mut Model, workers: &Workers, numbers: &mut Numbers, jog: Jog) {
+    model.messages.is_over_in(Pane::Jog);
+    match model.jog_step() {
+        JogStep::Hold => {
+            hold_jog(model, workers, jog);
+            model.motion = Motion::Jogging(jog);
+        }
+        JogStep::Step { metres, radians } => {
+            numbers.motion = MotionId(numbers.motion.0 + 1);
+            let id = numbers.motion;
+            let speed = model.speed();
+            let length = if jog.is_length(|joint| model.joint_kind(joint)) { metres } else { radians };
+            match workers.jog_step(id, jog, length, speed, camera_on_tip(model)) {
+                Ok(()) => {
+                    let (what, since_s) = (text!("the next step"), model.now_s);
+                    model.motion = Motion::Moving { id, what, since_s };
                 }
+                Err(busy) => model.say_in(Pane::Jog, Severity::Warning, busy.into()),
             }
         }
     }
+}
 
-    /// The button is still held. A jog that has ended by itself does not begin anew before the next press.
-    pub(crate) fn hold_jog(&mut self, jog: Jog) {
-        if self.model.jog_step() != JogStep::Hold {
-            return;
-        }
-        self.workers.hold_jog(jog, self.model.speed(), self.camera_on_tip());
+/// The button is still held. A jog that has ended by itself does not begin anew before the next press.
+fn hold_jog(model: &mut Model, workers: &Workers, jog: Jog) {
+    if model.jog_step() != JogStep::Hold {
+        return;
     }
+    workers.hold_jog(jog, model.speed(), camera_on_tip(model));
+}
 
-    pub(crate) fn release_jog(&mut self) {
-        self.workers.release_jog();
+fn jog_ended(model: &mut Model, why: Option<Text>) {
+    if matches!(model.motion, Motion::Jogging(_)) {
+        model.motion = Motion::Idle;
     }
+    if let Some(why) = why {
+        model.say_in(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
+    }
+}
 
-    pub(crate) fn jog_ended(&mut self, why: Option<Text>) {
-        if matches!(self.model.motion, Motion::Jogging(_)) {
-            self.model.motion = Motion::Idle;
-        }
-        if let Some(why) = why {
-            self.say_in(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
-        }
+/// A motion whose connection broke ended with it.
+pub(crate) fn motion_lost(cx: &mut Context) {
+    if let Motion::Moving { id, .. } = cx.model.motion {
+        moved(cx, id, MotionOutcome::Failed(text!("the connection broke on the way")));
     }
+    cx.model.motion = Motion::Idle;
+}
 
-    /// A motion whose connection broke ended with it.
-    pub(crate) fn motion_lost(&mut self) {
-        if let Motion::Moving { id, .. } = self.model.motion {
-            self.moved(id, MotionOutcome::Failed(text!("the connection broke on the way")));
-        }
-        self.model.motion = Motion::Idle;
-    }
-
-    /// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
-    fn camera_on_tip(&self) -> Option<Pose<Tip, Camera>> {
-        let said = || Some(self.model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
-        self.model.tip_from_camera().or_else(said)
-    }
+/// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
+fn camera_on_tip(model: &Model) -> Option<Pose<Tip, Camera>> {
+    let said = || Some(model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
+    model.tip_from_camera().or_else(said)
 }

@@ -8,6 +8,7 @@ mod captures;
 pub mod command;
 mod extent;
 mod known;
+pub(crate) mod update;
 
 pub use arm::{PosedArm, posed_arm};
 pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};

@@ -3,278 +3,301 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use handeye_dataset::CameraInput;
 use handeye_dataset::taught_poses::TaughtPose;
 use handeye_estimate::handeye::Mode;
-use handeye_export::ExportNames;
 use handeye_geometry::targets::TargetSpec;
 use handeye_session::{CaptureId, Edit, Role};
 
-use crate::app::App;
-use crate::model::{CapturePurpose, Dialog, FrameImages, Observed, RecentSession, Review, SessionState, Severity};
+use super::command::{Command, Event};
+use crate::app::{Context, Numbers, Reach, bounds_of};
+use crate::guided::update::forget_guided;
+use crate::model::{
+    CapturePurpose, Dialog, FrameImages, Model, Observed, RecentSession, Review, SessionState, Severity,
+};
 use crate::session::start;
+use crate::shell::update::set_dialog;
+use crate::solve::update::{forget_solve, solve_if_changed};
 use crate::taught::update::reference_poses;
 use crate::text::Text;
-use crate::worker::{ArchiveTask, Beginning, FileTask, ObserveJob, VisionTask, timestamp_rfc3339};
+use crate::worker::{
+    ArchiveTask, Beginning, FileTask, ObserveJob, SessionThreads, VisionTask, Workers, timestamp_rfc3339,
+};
 use handeye_wording::text;
 
-impl App {
-    /// What a new session begins with, by what is known of the cell.
-    fn beginning(&self) -> Box<Beginning> {
-        let cell = self.model.cell.as_ref();
-        let mut meta = start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
-        meta.arm = start::arm(cell.and_then(|cell| cell.arm.as_ref()));
-        meta.joint_kinds = cell.and_then(|cell| start::joint_kinds(cell.joints.iter().map(|joint| joint.kind)));
-        // They would send any other arm somewhere.
-        let poses = if self.model.has_reference_poses() { reference_poses() } else { Vec::new() };
-        let cell = self.model.taught_on(meta.target);
-        let taught = poses.into_iter().map(|pose| TaughtPose { cell: cell.clone(), ..pose }).collect();
-        Box::new(Beginning { meta, taught })
+/// Does what is wanted of the session.
+pub(crate) fn apply(
+    model: &mut Model,
+    workers: &Workers,
+    desk: &SessionThreads,
+    reach: Option<&Reach>,
+    command: Command,
+) {
+    match command {
+        Command::New(folder) => new_session(model, desk, folder),
+        Command::Open(folder) => open(model, desk, reach, folder),
+        Command::OpenSample => open_sample(model, desk),
+        Command::SaveAs(folder) => save_as(model, desk, folder),
+        Command::ListFolder(folder) => list_folder(model, desk, folder),
+        Command::OpenFolder(folder) => open_folder(model, desk, folder),
+        Command::Undo => undo(model, desk),
+        Command::Redo => redo(model, desk),
+        Command::Select(ids) => select(model, desk, ids),
+        Command::BackToLive => model.review = None,
+        Command::SetExcluded { ids, excluded } => edit(model, desk, Edit::SetExcluded { ids, excluded }),
+        Command::SetPurpose { ids, purpose } => set_purpose(model, desk, ids, purpose),
+        Command::Delete(ids) => delete(model, desk, ids),
+        Command::SetMode(mode) => set_mode(model, workers, desk, mode),
+        Command::SetCamera(camera) => edit(model, desk, Edit::SetCamera(camera)),
     }
+}
 
-    /// Says what a session begins with while there is none on the disk.
-    pub(crate) fn prepare_session(&mut self) {
-        if self.model.session.folder.is_none() {
-            self.ask_archive(ArchiveTask::Prepare(self.beginning()));
+/// Takes in what is on the disk and what was seen in it.
+pub(crate) fn absorb(cx: &mut Context, event: Event) {
+    match event {
+        Event::Document(state) => document_changed(cx, *state),
+        Event::Opened { exported } => session_opened(&mut cx.model, &cx.desk, exported),
+        Event::Failed { why } => session_failed(&mut cx.model, why),
+        Event::Observed { id, target, observed } => {
+            capture_observed(&mut cx.model, &mut cx.desk, &mut cx.numbers, id, target, observed);
         }
+        Event::Review { id, images } => reviewed(&mut cx.model, id, images),
+        Event::Folder(listing) => cx.model.folder = Some(listing),
+        Event::Recent(recent) => cx.model.recent = recent,
     }
+}
 
-    fn ask_archive(&mut self, task: ArchiveTask) {
-        let asked = self.desk.archive(task);
-        if asked.is_err() {
-            self.say(Severity::Error, text!("The disk does not keep up: nothing was changed. Try again in a moment"));
-        }
-    }
+/// What a new session begins with, by what is known of the cell.
+fn beginning(model: &Model) -> Box<Beginning> {
+    let cell = model.cell.as_ref();
+    let mut meta = start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
+    meta.arm = start::arm(cell.and_then(|cell| cell.arm.as_ref()));
+    meta.joint_kinds = cell.and_then(|cell| start::joint_kinds(cell.joints.iter().map(|joint| joint.kind)));
+    // They would send any other arm somewhere.
+    let poses = if model.has_reference_poses() { reference_poses() } else { Vec::new() };
+    let cell = model.taught_on(meta.target);
+    let taught = poses.into_iter().map(|pose| TaughtPose { cell: cell.clone(), ..pose }).collect();
+    Box::new(Beginning { meta, taught })
+}
 
-    /// Changes the document. It is shown when it is on the disk.
-    pub(crate) fn edit(&mut self, edit: Edit) {
-        self.ask_archive(ArchiveTask::Edit(Box::new(edit)));
+/// Says what a session begins with while there is none on the disk.
+pub(crate) fn prepare_session(model: &mut Model, desk: &SessionThreads) {
+    if model.session.folder.is_none() {
+        ask_archive(model, desk, ArchiveTask::Prepare(beginning(model)));
     }
+}
 
-    pub(crate) fn undo(&mut self) {
-        if self.model.session.undo.is_some() {
-            self.ask_archive(ArchiveTask::Undo);
-        }
+fn ask_archive(model: &mut Model, desk: &SessionThreads, task: ArchiveTask) {
+    let asked = desk.archive(task);
+    if asked.is_err() {
+        model.say(Severity::Error, text!("The disk does not keep up: nothing was changed. Try again in a moment"));
     }
+}
 
-    pub(crate) fn redo(&mut self) {
-        if self.model.session.redo.is_some() {
-            self.ask_archive(ArchiveTask::Redo);
-        }
-    }
+/// Changes the document. It is shown when it is on the disk.
+pub(crate) fn edit(model: &mut Model, desk: &SessionThreads, edit: Edit) {
+    ask_archive(model, desk, ArchiveTask::Edit(Box::new(edit)));
+}
 
-    pub(crate) fn set_excluded(&mut self, ids: Vec<CaptureId>, excluded: bool) {
-        self.edit(Edit::SetExcluded { ids, excluded });
+fn undo(model: &mut Model, desk: &SessionThreads) {
+    if model.session.undo.is_some() {
+        ask_archive(model, desk, ArchiveTask::Undo);
     }
+}
 
-    pub(crate) fn set_purpose(&mut self, ids: Vec<CaptureId>, purpose: CapturePurpose) {
-        let role = match purpose {
-            CapturePurpose::Calibrate => Role::Calibration,
-            CapturePurpose::Verify => Role::Verification,
-        };
-        self.edit(Edit::SetRole { ids, role });
+fn redo(model: &mut Model, desk: &SessionThreads) {
+    if model.session.redo.is_some() {
+        ask_archive(model, desk, ArchiveTask::Redo);
     }
+}
 
-    pub(crate) fn delete(&mut self, ids: Vec<CaptureId>) {
-        if !ids.is_empty() {
-            self.edit(Edit::DeleteCaptures(ids));
-        }
-    }
+fn set_purpose(model: &mut Model, desk: &SessionThreads, ids: Vec<CaptureId>, purpose: CapturePurpose) {
+    let role = match purpose {
+        CapturePurpose::Calibrate => Role::Calibration,
+        CapturePurpose::Verify => Role::Verification,
+    };
+    edit(model, desk, Edit::SetRole { ids, role });
+}
 
-    pub(crate) fn set_target(&mut self, target: TargetSpec) {
-        self.forget_guided();
-        self.edit(Edit::SetTarget(target));
+fn delete(model: &mut Model, desk: &SessionThreads, ids: Vec<CaptureId>) {
+    if !ids.is_empty() {
+        edit(model, desk, Edit::DeleteCaptures(ids));
     }
+}
 
-    pub(crate) fn set_mode(&mut self, mode: Mode) {
-        self.forget_guided();
-        self.edit(Edit::SetMode(mode));
-    }
+fn set_mode(model: &mut Model, workers: &Workers, desk: &SessionThreads, mode: Mode) {
+    forget_guided(model, workers);
+    edit(model, desk, Edit::SetMode(mode));
+}
 
-    pub(crate) fn set_camera(&mut self, camera: Option<CameraInput>) {
-        self.edit(Edit::SetCamera(camera));
-    }
+fn new_session(model: &mut Model, desk: &SessionThreads, folder: Option<PathBuf>) {
+    model.opening = true;
+    ask_archive(model, desk, ArchiveTask::New { folder, beginning: beginning(model) });
+}
 
-    pub(crate) fn set_export_names(&mut self, names: ExportNames) {
-        match serde_json::to_value(&names) {
-            Ok(value) => self.edit(Edit::SetExportNames(value)),
-            Err(error) => self.say(Severity::Error, text!("The names cannot be kept: {why}", why = error.to_string())),
-        }
-        self.model.export.names = names;
-        self.preview_exports();
-    }
+/// Goes on with a session; a data set is copied into one.
+fn open(model: &mut Model, desk: &SessionThreads, reach: Option<&Reach>, folder: PathBuf) {
+    model.opening = true;
+    let bounds = bounds_of(reach, &folder);
+    ask_archive(model, desk, ArchiveTask::Open { folder, bounds });
+}
 
-    pub(crate) fn new_session(&mut self, folder: Option<PathBuf>) {
-        self.model.opening = true;
-        self.ask_archive(ArchiveTask::New { folder, beginning: self.beginning() });
-    }
+/// A copy of the sample in a session of its own.
+fn open_sample(model: &mut Model, desk: &SessionThreads) {
+    model.opening = true;
+    ask_archive(model, desk, ArchiveTask::Sample);
+}
 
-    /// Goes on with a session; a data set is copied into one.
-    pub(crate) fn open(&mut self, folder: PathBuf) {
-        self.model.opening = true;
-        let bounds = self.bounds_of(&folder);
-        self.ask_archive(ArchiveTask::Open { folder, bounds });
-    }
+/// Goes on with the session in a folder, or begins one there.
+pub(crate) fn open_or_begin(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
+    model.opening = true;
+    ask_archive(model, desk, ArchiveTask::OpenOrNew { folder, beginning: beginning(model) });
+}
 
-    /// A copy of the sample in a session of its own.
-    pub(crate) fn open_sample(&mut self) {
-        self.model.opening = true;
-        self.ask_archive(ArchiveTask::Sample);
-    }
+fn save_as(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
+    model.opening = true;
+    ask_archive(model, desk, ArchiveTask::SaveAs(folder));
+}
 
-    /// Goes on with the session in a folder, or begins one there.
-    pub(crate) fn open_or_begin(&mut self, folder: PathBuf) {
-        self.model.opening = true;
-        self.ask_archive(ArchiveTask::OpenOrNew { folder, beginning: self.beginning() });
-    }
+pub(crate) fn list_folder(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
+    let asked = desk.files(FileTask::List(folder));
+    model.say_if_refused(text!("The folder was not read"), asked);
+}
 
-    pub(crate) fn save_as(&mut self, folder: PathBuf) {
-        self.model.opening = true;
-        self.ask_archive(ArchiveTask::SaveAs(folder));
-    }
+/// Shows a folder in the program of the system for that.
+fn open_folder(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
+    let asked = desk.files(FileTask::OpenFolder(folder));
+    model.say_if_refused(text!("The folder was not opened"), asked);
+}
 
-    pub(crate) fn list_folder(&mut self, folder: PathBuf) {
-        let asked = self.desk.files(FileTask::List(folder));
-        self.expect(text!("The folder was not read"), asked);
+/// The document is now like this, on the disk.
+fn document_changed(cx: &mut Context, state: SessionState) {
+    let before = std::mem::replace(&mut cx.model.session, state);
+    let (old, new) = (&before.document, Arc::clone(&cx.model.session.document));
+    let target_changed = old.meta.target != new.meta.target || before.folder.is_none();
+    let another = before.folder != cx.model.session.folder && before.folder.is_some();
+    if old.meta.target != new.meta.target || another {
+        cx.model.observed.clear();
     }
+    if before.folder.is_some() && (old.meta.target != new.meta.target || old.meta.mode != new.meta.mode) {
+        // Also by undo: what was chosen is of another board, or of another end of the arm.
+        forget_guided(&mut cx.model, &cx.workers);
+    }
+    if old.captures != new.captures || old.meta != new.meta {
+        cx.model.export.is_present = false;
+    }
+    if another {
+        forget_solve(cx);
+        cx.model.export.written = None;
+        cx.model.picked = None;
+        // Its poses are those of the other session.
+        cx.model.sequence = None;
+        cx.model.sequence_runs = false;
+        cx.model.asked = None;
+        cx.model.by_hand = None;
+    }
+    if let Some(names) = &new.export_names
+        && let Ok(names) = serde_json::from_value(names.clone())
+    {
+        cx.model.export.names = names;
+    }
+    remember_session(&mut cx.model);
+    let document = Arc::clone(&cx.model.session.document);
+    cx.model.selection.retain(|id| document.capture(*id).is_some());
+    if cx.model.review.as_ref().is_some_and(|review| document.capture(review.id).is_none()) {
+        cx.model.review = None;
+    }
+    if target_changed || another {
+        send_target(&mut cx.model, &cx.workers);
+    }
+    observe_missing(&mut cx.model, &mut cx.desk);
+    solve_if_changed(&mut cx.model, &mut cx.desk, &mut cx.numbers);
+}
 
-    /// Shows a folder in the program of the system for that.
-    pub(crate) fn open_folder(&mut self, folder: PathBuf) {
-        let asked = self.desk.files(FileTask::OpenFolder(folder));
-        self.expect(text!("The folder was not opened"), asked);
-    }
+/// Puts the session on the disk, however it came to be, first among the recent ones.
+fn remember_session(model: &mut Model) {
+    let Some(folder) = model.session.folder.clone() else { return };
+    let captures = model.document().captures.len();
+    model.recent.retain(|recent| recent.folder != folder);
+    model.recent.insert(0, RecentSession { folder, captures });
+}
 
-    /// The document is now like this, on the disk.
-    pub(crate) fn document_changed(&mut self, state: SessionState) {
-        let before = std::mem::replace(&mut self.model.session, state);
-        let (old, new) = (&before.document, Arc::clone(&self.model.session.document));
-        let target_changed = old.meta.target != new.meta.target || before.folder.is_none();
-        let another = before.folder != self.model.session.folder && before.folder.is_some();
-        if old.meta.target != new.meta.target || another {
-            self.model.observed.clear();
-        }
-        if before.folder.is_some() && (old.meta.target != new.meta.target || old.meta.mode != new.meta.mode) {
-            // Also by undo: what was chosen is of another board, or of another end of the arm.
-            self.forget_guided();
-        }
-        if old.captures != new.captures || old.meta != new.meta {
-            self.model.export.is_present = false;
-        }
-        if another {
-            self.forget_solve();
-            self.model.export.written = None;
-            self.model.picked = None;
-            // Its poses are those of the other session.
-            self.model.sequence = None;
-            self.model.sequence_runs = false;
-            self.model.asked = None;
-            self.model.by_hand = None;
-        }
-        if let Some(names) = &new.export_names
-            && let Ok(names) = serde_json::from_value(names.clone())
-        {
-            self.model.export.names = names;
-        }
-        self.remember_session();
-        let document = Arc::clone(&self.model.session.document);
-        self.model.selection.retain(|id| document.capture(*id).is_some());
-        if self.model.review.as_ref().is_some_and(|review| document.capture(review.id).is_none()) {
-            self.model.review = None;
-        }
-        if target_changed || another {
-            self.send_target();
-        }
-        self.observe_missing();
-        self.solve_if_changed();
+fn session_opened(model: &mut Model, desk: &SessionThreads, exported: bool) {
+    model.opening = false;
+    model.scene_is_fitted = false;
+    model.export.is_present = exported;
+    model.selection.clear();
+    model.review = None;
+    if matches!(model.dialog, Some(Dialog::Open | Dialog::Import | Dialog::SaveAs | Dialog::New)) {
+        set_dialog(model, desk, None);
     }
+    if let Some(folder) = model.session.folder.clone() {
+        model.say(Severity::Info, text!("Session {folder} is open", folder = folder.display()));
+    }
+}
 
-    /// Puts the session on the disk, however it came to be, first among the recent ones.
-    fn remember_session(&mut self) {
-        let Some(folder) = self.model.session.folder.clone() else { return };
-        let captures = self.model.document().captures.len();
-        self.model.recent.retain(|recent| recent.folder != folder);
-        self.model.recent.insert(0, RecentSession { folder, captures });
-    }
+fn session_failed(model: &mut Model, why: Text) {
+    model.opening = false;
+    model.say(Severity::Error, why);
+}
 
-    pub(crate) fn session_opened(&mut self, exported: bool) {
-        self.model.opening = false;
-        self.model.scene_is_fitted = false;
-        self.model.export.is_present = exported;
-        self.model.selection.clear();
-        self.model.review = None;
-        if matches!(self.model.dialog, Some(Dialog::Open | Dialog::Import | Dialog::SaveAs | Dialog::New)) {
-            self.set_dialog(None);
-        }
-        if let Some(folder) = self.model.session.folder.clone() {
-            self.say(Severity::Info, text!("Session {folder} is open", folder = folder.display()));
-        }
+/// Has the captures looked at that nobody has looked at for the present target.
+fn observe_missing(model: &mut Model, desk: &mut SessionThreads) {
+    let Some(folder) = model.session.folder.clone() else { return };
+    let document = Arc::clone(&model.session.document);
+    let captures: Vec<_> =
+        document.captures.iter().filter(|it| !model.observed.contains_key(&it.id)).cloned().collect();
+    if !captures.is_empty() {
+        desk.observe(ObserveJob { folder, target: document.meta.target, captures });
     }
+}
 
-    pub(crate) fn session_failed(&mut self, why: Text) {
-        self.model.opening = false;
-        self.say(Severity::Error, why);
+fn capture_observed(
+    model: &mut Model,
+    desk: &mut SessionThreads,
+    numbers: &mut Numbers,
+    id: CaptureId,
+    target: TargetSpec,
+    observed: Option<Arc<Observed>>,
+) {
+    if target == model.document().meta.target {
+        model.observed.insert(id, observed);
+        solve_if_changed(model, desk, numbers);
     }
+}
 
-    /// Has the captures looked at that nobody has looked at for the present target.
-    fn observe_missing(&mut self) {
-        let Some(folder) = self.model.session.folder.clone() else { return };
-        let document = Arc::clone(&self.model.session.document);
-        let captures: Vec<_> =
-            document.captures.iter().filter(|it| !self.model.observed.contains_key(&it.id)).cloned().collect();
-        if !captures.is_empty() {
-            self.desk.observe(ObserveJob { folder, target: document.meta.target, captures });
-        }
+fn select(model: &mut Model, desk: &SessionThreads, ids: Vec<CaptureId>) {
+    let shown = ids.last().copied();
+    model.selection = ids;
+    let Some(id) = shown else {
+        model.review = None;
+        return;
+    };
+    if model.review.as_ref().is_some_and(|review| review.id == id) {
+        return;
     }
+    model.review = Some(Review { id, images: None });
+    let capture = model.document().capture(id).cloned();
+    let (Some(folder), Some(capture)) = (model.session.folder.clone(), capture) else { return };
+    let asked = desk.files(FileTask::Review { folder, capture: Box::new(capture), colours: model.view.depth_colours });
+    model.say_if_refused(text!("The capture is not shown"), asked);
+}
 
-    pub(crate) fn observed(&mut self, id: CaptureId, target: TargetSpec, observed: Option<Arc<Observed>>) {
-        if target == self.model.document().meta.target {
-            self.model.observed.insert(id, observed);
-            self.solve_if_changed();
-        }
+fn reviewed(model: &mut Model, id: CaptureId, images: Option<Arc<FrameImages>>) {
+    if let Some(review) = model.review.as_mut().filter(|review| review.id == id) {
+        review.images = images;
     }
+}
 
-    pub(crate) fn select(&mut self, ids: Vec<CaptureId>) {
-        let shown = ids.last().copied();
-        self.model.selection = ids;
-        let Some(id) = shown else {
-            self.model.review = None;
-            return;
-        };
-        if self.model.review.as_ref().is_some_and(|review| review.id == id) {
-            return;
-        }
-        self.model.review = Some(Review { id, images: None });
-        let capture = self.model.document().capture(id).cloned();
-        let (Some(folder), Some(capture)) = (self.model.session.folder.clone(), capture) else { return };
-        let asked = self.desk.files(FileTask::Review {
-            folder,
-            capture: Box::new(capture),
-            colours: self.model.view.depth_colours,
-        });
-        self.expect(text!("The capture is not shown"), asked);
-    }
+/// Tells the threads that look for the board what it is.
+pub(crate) fn send_target(model: &mut Model, workers: &Workers) {
+    let target = model.document().meta.target;
+    let asked = workers.ask_vision(VisionTask::SetTarget(target));
+    model.say_if_refused(text!("The target was not changed"), asked);
+}
 
-    pub(crate) fn back_to_live(&mut self) {
-        self.model.review = None;
-    }
-
-    pub(crate) fn reviewed(&mut self, id: CaptureId, images: Option<Arc<FrameImages>>) {
-        if let Some(review) = self.model.review.as_mut().filter(|review| review.id == id) {
-            review.images = images;
-        }
-    }
-
-    /// Tells the threads that look for the board what it is.
-    pub(crate) fn send_target(&mut self) {
-        let target = self.model.document().meta.target;
-        let asked = self.workers.ask_vision(VisionTask::SetTarget(target));
-        self.expect(text!("The target was not changed"), asked);
-    }
-
-    /// Tells them what the camera is.
-    pub(crate) fn send_intrinsics(&mut self) {
-        let Some(intrinsics) = self.model.intrinsics() else { return };
-        let asked = self.workers.ask_vision(VisionTask::SetIntrinsics(intrinsics));
-        self.expect(text!("The camera was not changed"), asked);
-    }
+/// Tells them what the camera is.
+pub(crate) fn send_intrinsics(model: &mut Model, workers: &Workers) {
+    let Some(intrinsics) = model.intrinsics() else { return };
+    let asked = workers.ask_vision(VisionTask::SetIntrinsics(intrinsics));
+    model.say_if_refused(text!("The camera was not changed"), asked);
 }

@@ -2,5 +2,6 @@
 
 pub mod command;
 pub(crate) mod state;
+pub(crate) mod update;
 
 pub use command::Command;

@@ -9,217 +9,233 @@ use handeye_geometry::progress::Stage;
 use handeye_geometry::targets::observation::{Corners, Sight};
 use handeye_session::{CaptureId, Document, SessionObservations};
 
+use super::command::{Command, Event};
 use super::question::Question;
-use crate::app::App;
-use crate::model::{BoxState, Goal, JobId, Severity, SolveState, SolveStatus, WorkBox, box_in_camera, judge_box};
+use crate::app::{Context, Numbers};
+use crate::export::update::preview_exports;
+use crate::model::{
+    BoxState, Goal, JobId, Model, Severity, SolveState, SolveStatus, WorkBox, box_in_camera, judge_box,
+};
+use crate::session::update::send_intrinsics;
 use crate::solve::SolveOutcome;
-use crate::text::Text;
-use crate::worker::{ArchiveTask, SolveJob};
+use crate::track::update::{send_tracking, set_tracking};
+use crate::worker::{ArchiveTask, SessionThreads, SolveJob};
 use handeye_wording::text;
 
-impl App {
-    fn question(&self) -> Question {
-        let document = self.model.document();
-        Question {
-            meta: (document.meta.mode, document.meta.target, document.meta.camera),
-            captures: document
-                .captures
-                .iter()
-                .map(|it| (it.id, it.role, it.excluded, self.model.observed(it.id).is_some()))
-                .collect(),
-            folder: self.model.session.folder.clone(),
-            method: self.model.method.clone(),
-            keep_outliers: self.model.keep_outliers,
-            goal: self.model.view.goal,
-        }
+/// Does what is wanted of the calibration.
+pub(crate) fn apply(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers, command: Command) {
+    match command {
+        Command::Solve => solve_again(model, desk, numbers),
+        Command::Cancel => desk.cancel_solve(),
+        Command::SetMethod(name) => set_method(model, desk, numbers, &name),
+        Command::SetKeepOutliers(keep) => set_keep_outliers(model, desk, numbers, keep),
+        Command::SetTipBox(chosen) => set_tip_box(model, chosen),
+        Command::SetGoal(goal) => set_goal(model, desk, numbers, goal),
+        Command::SetOutlierLine(line_px) => model.outlier_line_px = line_px,
     }
+}
 
-    /// Solves unless the answer to the present question is there or on its way.
-    pub(crate) fn solve_if_changed(&mut self) {
-        // Half of a session that was just opened would give half an answer.
-        let document = self.model.document();
-        if !document.captures.iter().all(|it| self.model.observed.contains_key(&it.id)) {
-            return;
-        }
-        let question = self.question();
-        if self.asked.as_ref() != Some(&question) {
-            self.asked = Some(question);
-            self.solve();
-        }
+/// Takes in how a solve goes on.
+pub(crate) fn absorb(cx: &mut Context, event: Event) {
+    match event {
+        Event::Progress { job, stage, part } => solve_progress(&mut cx.model, job, stage, part),
+        Event::Ended { job, outcome } => solve_ended(cx, job, outcome),
     }
+}
 
-    pub(crate) fn solve_again(&mut self) {
-        self.asked = Some(self.question());
-        self.solve();
+fn question(model: &Model) -> Question {
+    let document = model.document();
+    Question {
+        meta: (document.meta.mode, document.meta.target, document.meta.camera),
+        captures: document
+            .captures
+            .iter()
+            .map(|it| (it.id, it.role, it.excluded, model.observed(it.id).is_some()))
+            .collect(),
+        folder: model.session.folder.clone(),
+        method: model.method.clone(),
+        keep_outliers: model.keep_outliers,
+        goal: model.view.goal,
     }
+}
 
-    fn solve(&mut self) {
-        // From here on what an earlier job reports is of no interest.
-        self.numbers.job = JobId(self.numbers.job.0 + 1);
-        let id = self.numbers.job;
-        self.model.solve.fresh = false;
-        let document = Arc::clone(&self.model.session.document);
-        let seen = document.in_use().filter(|it| self.corners(it.id).is_some()).count();
-        if seen < MIN_VIEWS {
-            self.desk.cancel_solve();
-            self.model.solve.status = if document.captures.is_empty() {
-                SolveStatus::Idle
-            } else if document.mode().is_none() {
-                SolveStatus::Failed {
-                    why: text!(
-                        "{seen} {seen|image|images} with the board in use, at least {need} are needed",
-                        seen = seen,
-                        need = MIN_VIEWS
-                    ),
-                }
-            } else {
-                SolveStatus::Failed {
-                    why: text!(
-                        "{seen} {seen|capture|captures} with the board in use, at least {need} are needed: capture more poses",
-                        seen = seen,
-                        need = MIN_VIEWS
-                    ),
-                }
-            };
-            return;
-        }
-        let since_s = self.model.now_s;
-        self.model.solve.status = SolveStatus::Running { job: id, stage: Stage::Intrinsics, part: 0.0, since_s };
-        let job = self.job(id, &document);
-        self.desk.solve(job);
+/// Solves unless the answer to the present question is there or on its way.
+pub(crate) fn solve_if_changed(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
+    // Half of a session that was just opened would give half an answer.
+    let document = model.document();
+    if !document.captures.iter().all(|it| model.observed.contains_key(&it.id)) {
+        return;
     }
-
-    pub(crate) fn corners(&self, id: CaptureId) -> Option<&Corners> {
-        self.model.observed(id)?.corners.as_ref()
+    let question = question(model);
+    if numbers.asked.as_ref() != Some(&question) {
+        numbers.asked = Some(question);
+        solve(model, desk, numbers);
     }
+}
 
-    fn sight(&self, id: CaptureId) -> Option<Sight> {
-        let observed = self.model.observed(id)?;
-        Some(Sight { corners: observed.corners.clone()?, depth: observed.depth })
-    }
+fn solve_again(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
+    numbers.asked = Some(question(model));
+    solve(model, desk, numbers);
+}
 
-    /// What was observed in the captures.
-    pub(crate) fn seen(&self, document: &Document) -> SessionObservations {
-        document.observations(self.image_size(), |id| self.sight(id))
-    }
-
-    /// Whether the present question was asked, of captures that have all been looked at.
-    pub(crate) fn is_asked(&self) -> bool {
-        let document = self.model.document();
-        let are_seen = document.captures.iter().all(|it| self.model.observed.contains_key(&it.id));
-        are_seen && self.asked.as_ref() == Some(&self.question())
-    }
-
-    fn job(&self, id: JobId, document: &Document) -> SolveJob {
-        let SessionObservations { observations, captures, verification } = self.seen(document);
-        SolveJob {
-            id,
-            observations,
-            captures,
-            verification,
-            method: Method::by_name(&self.model.method).unwrap_or_default(),
-            options: Options { keep_outliers: self.model.keep_outliers, ..Options::default() },
-            goal_m: self.model.view.goal.0,
-            truth: self.model.cell.as_ref().and_then(|cell| cell.truth.clone()),
-        }
-    }
-
-    /// Width and height of the images in pixels: all captures of a session have the same.
-    fn image_size(&self) -> (u32, u32) {
-        self.model.observed.values().flatten().map(|observed| observed.image_size).next().unwrap_or_default()
-    }
-
-    /// Forgets question and answer: they are of another session.
-    pub(crate) fn forget_solve(&mut self) {
-        self.desk.cancel_solve();
-        self.numbers.job = JobId(self.numbers.job.0 + 1);
-        self.asked = None;
-        self.model.solve = SolveState::default();
-        self.model.tip_box = BoxState::default();
-        self.set_tracking(false);
-    }
-
-    pub(crate) fn cancel_solve(&mut self) {
-        self.desk.cancel_solve();
-    }
-
-    pub(crate) fn set_method(&mut self, name: &str) {
-        if Method::by_name(name).is_some() {
-            name.clone_into(&mut self.model.method);
-            self.solve_if_changed();
-        }
-    }
-
-    pub(crate) fn set_keep_outliers(&mut self, keep: bool) {
-        self.model.keep_outliers = keep;
-        self.solve_if_changed();
-    }
-
-    pub(crate) fn set_tip_box(&mut self, chosen: Option<WorkBox>) {
-        let is_finite = |work_box: &WorkBox| work_box.from_m.iter().chain(&work_box.to_m).all(|m| m.is_finite());
-        if chosen.as_ref().is_none_or(is_finite) {
-            self.model.tip_box.chosen = chosen;
-            self.judge_tip_box();
-        }
-    }
-
-    /// The box that was chosen, where the camera sees it by the newest answer: guided capture judges its goal over it.
-    pub(crate) fn chosen_box(&self) -> Option<TipBox> {
-        let (chosen, solved) = (self.model.tip_box.chosen?, self.model.solve.solved.as_deref()?);
-        box_in_camera(&chosen, solved, self.model.document())
-    }
-
-    /// Some milliseconds, so only when box or answer are others.
-    fn judge_tip_box(&mut self) {
-        let model = &self.model;
-        let judged = model.solve.solved.as_deref().and_then(|it| judge_box(model.tip_box.chosen, it, model.document()));
-        self.model.tip_box.judged = judged;
-    }
-
-    pub(crate) fn set_goal(&mut self, goal_m: f64) {
-        if goal_m.is_finite() && goal_m > 0.0 {
-            self.model.view.goal = Goal(goal_m);
-            self.solve_if_changed();
-        }
-    }
-
-    pub(crate) fn solve_progress(&mut self, job: JobId, now: Stage, now_part: f64) {
-        if let SolveStatus::Running { job: running, stage, part, .. } = &mut self.model.solve.status
-            && *running == job
-        {
-            (*stage, *part) = (now, now_part);
-        }
-    }
-
-    pub(crate) fn solve_ended(&mut self, job: JobId, outcome: SolveOutcome) {
-        // An answer to an earlier question is no longer of interest.
-        if job != self.numbers.job {
-            return;
-        }
-        match outcome {
-            SolveOutcome::Solved(solved) => {
-                self.model.solve.status = SolveStatus::Idle;
-                self.model.solve.fresh = true;
-                let result = Box::new(solved.result.clone());
-                self.model.solve.solved = Some(solved);
-                self.judge_tip_box();
-                self.send_intrinsics();
-                self.send_tracking();
-                self.preview_exports();
-                let Some(folder) = self.model.session.folder.clone() else { return };
-                if self.desk.archive(ArchiveTask::Result { folder, result }).is_err() {
-                    self.say(
-                        Severity::Warning,
-                        text!("The result was not kept beside the session; solve again to keep it"),
-                    );
-                }
+fn solve(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
+    // From here on what an earlier job reports is of no interest.
+    numbers.job = JobId(numbers.job.0 + 1);
+    let id = numbers.job;
+    model.solve.fresh = false;
+    let document = Arc::clone(&model.session.document);
+    let seen = document.in_use().filter(|it| corners(model, it.id).is_some()).count();
+    if seen < MIN_VIEWS {
+        desk.cancel_solve();
+        model.solve.status = if document.captures.is_empty() {
+            SolveStatus::Idle
+        } else if document.mode().is_none() {
+            SolveStatus::Failed {
+                why: text!(
+                    "{seen} {seen|image|images} with the board in use, at least {need} are needed",
+                    seen = seen,
+                    need = MIN_VIEWS
+                ),
             }
-            SolveOutcome::Failed(why) => self.no_answer(why),
-            SolveOutcome::Cancelled => self.model.solve.status = SolveStatus::Cancelled,
-        }
+        } else {
+            SolveStatus::Failed {
+                why: text!(
+                    "{seen} {seen|capture|captures} with the board in use, at least {need} are needed: capture more poses",
+                    seen = seen,
+                    need = MIN_VIEWS
+                ),
+            }
+        };
+        return;
     }
+    let since_s = model.now_s;
+    model.solve.status = SolveStatus::Running { job: id, stage: Stage::Intrinsics, part: 0.0, since_s };
+    let job = job(model, id, &document);
+    desk.solve(job);
+}
 
-    fn no_answer(&mut self, why: Text) {
-        self.model.solve.status = SolveStatus::Failed { why };
+pub(crate) fn corners(model: &Model, id: CaptureId) -> Option<&Corners> {
+    model.observed(id)?.corners.as_ref()
+}
+
+fn sight(model: &Model, id: CaptureId) -> Option<Sight> {
+    let observed = model.observed(id)?;
+    Some(Sight { corners: observed.corners.clone()?, depth: observed.depth })
+}
+
+/// What was observed in the captures.
+pub(crate) fn seen(model: &Model, document: &Document) -> SessionObservations {
+    document.observations(image_size(model), |id| sight(model, id))
+}
+
+/// Whether the present question was asked, of captures that have all been looked at.
+pub(crate) fn is_asked(model: &Model, numbers: &Numbers) -> bool {
+    let document = model.document();
+    let are_seen = document.captures.iter().all(|it| model.observed.contains_key(&it.id));
+    are_seen && numbers.asked.as_ref() == Some(&question(model))
+}
+
+fn job(model: &Model, id: JobId, document: &Document) -> SolveJob {
+    let SessionObservations { observations, captures, verification } = seen(model, document);
+    SolveJob {
+        id,
+        observations,
+        captures,
+        verification,
+        method: Method::by_name(&model.method).unwrap_or_default(),
+        options: Options { keep_outliers: model.keep_outliers, ..Options::default() },
+        goal_m: model.view.goal.0,
+        truth: model.cell.as_ref().and_then(|cell| cell.truth.clone()),
+    }
+}
+
+/// Width and height of the images in pixels: all captures of a session have the same.
+fn image_size(model: &Model) -> (u32, u32) {
+    model.observed.values().flatten().map(|observed| observed.image_size).next().unwrap_or_default()
+}
+
+/// Forgets question and answer: they are of another session.
+pub(crate) fn forget_solve(cx: &mut Context) {
+    cx.desk.cancel_solve();
+    cx.numbers.job = JobId(cx.numbers.job.0 + 1);
+    cx.numbers.asked = None;
+    cx.model.solve = SolveState::default();
+    cx.model.tip_box = BoxState::default();
+    set_tracking(&mut cx.model, &cx.workers, &mut cx.numbers, false);
+}
+
+pub(crate) fn set_method(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers, name: &str) {
+    if Method::by_name(name).is_some() {
+        name.clone_into(&mut model.method);
+        solve_if_changed(model, desk, numbers);
+    }
+}
+
+fn set_keep_outliers(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers, keep: bool) {
+    model.keep_outliers = keep;
+    solve_if_changed(model, desk, numbers);
+}
+
+fn set_tip_box(model: &mut Model, chosen: Option<WorkBox>) {
+    let is_finite = |work_box: &WorkBox| work_box.from_m.iter().chain(&work_box.to_m).all(|m| m.is_finite());
+    if chosen.as_ref().is_none_or(is_finite) {
+        model.tip_box.chosen = chosen;
+        judge_tip_box(model);
+    }
+}
+
+/// The box that was chosen, where the camera sees it by the newest answer: guided capture judges its goal over it.
+pub(crate) fn chosen_box(model: &Model) -> Option<TipBox> {
+    let (chosen, solved) = (model.tip_box.chosen?, model.solve.solved.as_deref()?);
+    box_in_camera(&chosen, solved, model.document())
+}
+
+/// Some milliseconds, so only when box or answer are others.
+fn judge_tip_box(model: &mut Model) {
+    let model = model;
+    let judged = model.solve.solved.as_deref().and_then(|it| judge_box(model.tip_box.chosen, it, model.document()));
+    model.tip_box.judged = judged;
+}
+
+fn set_goal(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers, goal_m: f64) {
+    if goal_m.is_finite() && goal_m > 0.0 {
+        model.view.goal = Goal(goal_m);
+        solve_if_changed(model, desk, numbers);
+    }
+}
+
+fn solve_progress(model: &mut Model, job: JobId, now: Stage, now_part: f64) {
+    if let SolveStatus::Running { job: running, stage, part, .. } = &mut model.solve.status
+        && *running == job
+    {
+        (*stage, *part) = (now, now_part);
+    }
+}
+
+fn solve_ended(cx: &mut Context, job: JobId, outcome: SolveOutcome) {
+    // An answer to an earlier question is no longer of interest.
+    if job != cx.numbers.job {
+        return;
+    }
+    match outcome {
+        SolveOutcome::Solved(solved) => {
+            cx.model.solve.status = SolveStatus::Idle;
+            cx.model.solve.fresh = true;
+            let result = Box::new(solved.result.clone());
+            cx.model.solve.solved = Some(solved);
+            judge_tip_box(&mut cx.model);
+            send_intrinsics(&mut cx.model, &cx.workers);
+            send_tracking(&mut cx.model, &cx.workers);
+            preview_exports(&mut cx.model, &cx.desk);
+            let Some(folder) = cx.model.session.folder.clone() else { return };
+            if cx.desk.archive(ArchiveTask::Result { folder, result }).is_err() {
+                cx.model.say(
+                    Severity::Warning,
+                    text!("The result was not kept beside the session; solve again to keep it"),
+                );
+            }
+        }
+        SolveOutcome::Failed(why) => cx.model.solve.status = SolveStatus::Failed { why },
+        SolveOutcome::Cancelled => cx.model.solve.status = SolveStatus::Cancelled,
     }
 }

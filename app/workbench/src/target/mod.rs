@@ -2,5 +2,6 @@
 
 pub mod command;
 pub(crate) mod print;
+pub(crate) mod update;
 
 pub use command::Command;

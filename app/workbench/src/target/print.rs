@@ -6,10 +6,10 @@ use handeye_files::atomic_file;
 use handeye_geometry::targets::TargetSpec;
 use handeye_print::{Page, target_pdf};
 
-use crate::app::App;
+use crate::model::Model;
 use crate::model::Severity;
 use crate::text::Text;
-use crate::worker::FileTask;
+use crate::worker::{FileTask, SessionThreads};
 use handeye_wording::Value;
 use handeye_wording::text;
 
@@ -44,13 +44,11 @@ fn file_name(target: &TargetSpec) -> String {
     format!("{}_{size}.pdf", target.kind())
 }
 
-impl App {
-    /// Writes the board of the session for a printer, into the session or beside the others.
-    pub(crate) fn print_target(&mut self, page: Page) {
-        let target = self.model.document().meta.target;
-        let folder: &PathBuf = self.model.session.folder.as_ref().unwrap_or(&self.model.sessions);
-        let file = folder.join(file_name(&target));
-        let asked = self.desk.files(FileTask::PrintTarget { target, page, file });
-        self.expect(text!("The board was not written"), asked);
-    }
+/// Writes the board of the session for a printer, into the session or beside the others.
+pub(crate) fn print_target(model: &mut Model, desk: &SessionThreads, page: Page) {
+    let target = model.document().meta.target;
+    let folder: &PathBuf = model.session.folder.as_ref().unwrap_or(&model.sessions);
+    let file = folder.join(file_name(&target));
+    let asked = desk.files(FileTask::PrintTarget { target, page, file });
+    model.say_if_refused(text!("The board was not written"), asked);
 }

@@ -6,10 +6,15 @@ use handeye_arm::{JointKind, JointValues};
 use handeye_dataset::taught_poses::{Goal, TaughtPose, TaughtPoses};
 use handeye_session::{Edit, TaughtChange};
 
-use crate::app::App;
-use crate::model::{MotionGoal, MotionOutcome, Severity};
+use super::command::{Command, Event};
+use crate::app::Context;
+use crate::model::{Model, MotionGoal, MotionOutcome, Severity};
+use crate::motion::ask::{may_set_out, set_out};
+use crate::motion::update::moved;
 use crate::session::start::REFERENCE_POSES;
-use crate::worker::FileTask;
+use crate::session::update::edit;
+use crate::taught::sequence::{continue_sequence, plan_verification, planned, run_sequence, stop_sequence};
+use crate::worker::{FileTask, SessionThreads};
 use handeye_wording::text;
 
 /// The reference poses.
@@ -24,140 +29,165 @@ pub fn reference_poses() -> Vec<TaughtPose> {
     }
 }
 
-impl App {
-    /// These are the poses of this cell now; those of others stay.
-    fn edit_taught(&mut self, change: TaughtChange, poses: Vec<TaughtPose>) {
-        let Some(cell) = self.model.taught_on(self.model.document().meta.target) else {
-            return self.say(Severity::Warning, text!("Taught poses belong to an arm: connect it first"));
-        };
-        let mut all = self.model.document().taught.clone();
-        all.retain(|pose| !pose.is_of(Some(&cell)));
-        all.extend(poses.into_iter().map(|pose| TaughtPose { cell: Some(cell.clone()), ..pose }));
-        self.edit(Edit::SetTaught { change, poses: all });
+/// Does what is wanted of taught poses and sequences.
+pub(crate) fn apply(cx: &mut Context, command: Command) {
+    match command {
+        Command::Teach { name } => teach(&mut cx.model, &cx.desk, name),
+        Command::Remove(name) => remove_taught(&mut cx.model, &cx.desk, &name),
+        Command::Rename { from, to } => rename_taught(&mut cx.model, &cx.desk, &from, &to),
+        Command::Reorder { name, to } => reorder_taught(&mut cx.model, &cx.desk, &name, to),
+        Command::TeachReference => teach_reference(&mut cx.model, &cx.desk),
+        Command::Adopt => adopt_taught(&mut cx.model, &cx.desk),
+        Command::Import(file) => import_taught(&mut cx.model, &cx.desk, file),
+        Command::Export(file) => export_taught(&mut cx.model, &cx.desk, file),
+        Command::GoTo(name) => visit_taught(cx, &name),
+        Command::RunSequence { purpose } => run_sequence(cx, purpose),
+        Command::ContinueSequence => continue_sequence(cx),
+        Command::StopSequence => stop_sequence(&mut cx.model, &cx.workers),
+        Command::VerifyAtPlanned => plan_verification(&mut cx.model, &cx.workers, &mut cx.numbers),
     }
+}
 
-    fn taught(&self) -> Vec<TaughtPose> {
-        self.model.taught().into_iter().cloned().collect()
+/// Takes in poses that were read or planned.
+pub(crate) fn absorb(cx: &mut Context, event: Event) {
+    match event {
+        Event::Read { poses } => poses_read(&mut cx.model, &cx.desk, poses),
+        Event::Planned { id, views } => planned(cx, id, views),
     }
+}
 
-    /// Joints are remembered and not the tip, because they bring the arm back on the same way.
-    pub(crate) fn teach(&mut self, name: Option<String>) {
-        let Some(robot) = &self.model.robot else {
-            self.say(Severity::Warning, text!("The position of the arm is not known: connect first"));
-            return;
-        };
-        let goal = Goal::Joints(robot.joints_rad.to_vec());
-        let mut poses = self.taught();
-        let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
-        let name = name.unwrap_or_else(|| free_name(&poses));
-        poses.push(TaughtPose::new(name.clone(), goal));
-        self.edit_taught(TaughtChange::Add(name), poses);
+/// These are the poses of this cell now; those of others stay.
+fn edit_taught(model: &mut Model, desk: &SessionThreads, change: TaughtChange, poses: Vec<TaughtPose>) {
+    let Some(cell) = model.taught_on(model.document().meta.target) else {
+        return model.say(Severity::Warning, text!("Taught poses belong to an arm: connect it first"));
+    };
+    let mut all = model.document().taught.clone();
+    all.retain(|pose| !pose.is_of(Some(&cell)));
+    all.extend(poses.into_iter().map(|pose| TaughtPose { cell: Some(cell.clone()), ..pose }));
+    edit(model, desk, Edit::SetTaught { change, poses: all });
+}
+
+fn taught(model: &Model) -> Vec<TaughtPose> {
+    model.taught().into_iter().cloned().collect()
+}
+
+/// Joints are remembered and not the tip, because they bring the arm back on the same way.
+fn teach(model: &mut Model, desk: &SessionThreads, name: Option<String>) {
+    let Some(robot) = &model.robot else {
+        model.say(Severity::Warning, text!("The position of the arm is not known: connect first"));
+        return;
+    };
+    let goal = Goal::Joints(robot.joints_rad.to_vec());
+    let mut poses = taught(model);
+    let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+    let name = name.unwrap_or_else(|| free_name(&poses));
+    poses.push(TaughtPose::new(name.clone(), goal));
+    edit_taught(model, desk, TaughtChange::Add(name), poses);
+}
+
+fn remove_taught(model: &mut Model, desk: &SessionThreads, name: &str) {
+    let mut poses = taught(model);
+    poses.retain(|pose| pose.name != name);
+    edit_taught(model, desk, TaughtChange::Remove(name.to_owned()), poses);
+}
+
+fn rename_taught(model: &mut Model, desk: &SessionThreads, from: &str, to: &str) {
+    let to = to.trim();
+    if from == to {
+        return;
     }
-
-    pub(crate) fn remove_taught(&mut self, name: &str) {
-        let mut poses = self.taught();
-        poses.retain(|pose| pose.name != name);
-        self.edit_taught(TaughtChange::Remove(name.to_owned()), poses);
+    let mut poses = taught(model);
+    for pose in poses.iter_mut().filter(|pose| pose.name == from) {
+        to.clone_into(&mut pose.name);
     }
+    edit_taught(model, desk, TaughtChange::Rename { from: from.to_owned(), to: to.to_owned() }, poses);
+}
 
-    pub(crate) fn rename_taught(&mut self, from: &str, to: &str) {
-        let to = to.trim();
-        if from == to {
-            return;
+fn reorder_taught(model: &mut Model, desk: &SessionThreads, name: &str, to: usize) {
+    let mut poses = taught(model);
+    let Some(from) = poses.iter().position(|pose| pose.name == name) else { return };
+    let pose = poses.remove(from);
+    poses.insert(to.min(poses.len()), pose);
+    edit_taught(model, desk, TaughtChange::Reorder(name.to_owned()), poses);
+}
+
+fn teach_reference(model: &mut Model, desk: &SessionThreads) {
+    if model.has_reference_poses() {
+        edit_taught(model, desk, TaughtChange::Replace, reference_poses());
+    }
+}
+
+/// A person says that arm, base and target are as they were where the poses were taught.
+fn adopt_taught(model: &mut Model, desk: &SessionThreads) {
+    let Some(cell) = model.taught_on(model.document().meta.target) else { return };
+    let fits = |pose: &&TaughtPose| match &pose.goal {
+        Goal::Joints(joints) => joints.len() == cell.joints.len(),
+        Goal::Tip(_) => true,
+    };
+    let elsewhere = model.document().taught.iter().filter(|pose| !pose.is_of(Some(&cell)));
+    let (fit, others): (Vec<&TaughtPose>, Vec<&TaughtPose>) = elsewhere.partition(fits);
+    let (adopted, others) = (fit.into_iter().cloned().collect::<Vec<_>>(), others.len());
+    if others > 0 {
+        let said = text!("{n} {n|pose has|poses have} another number of joints than this arm", n = others);
+        model.say(Severity::Warning, said);
+    }
+    if adopted.is_empty() {
+        return;
+    }
+    let change = TaughtChange::Import(adopted.len() as u32);
+    let mut poses = taught(model);
+    let mut all = model.document().taught.clone();
+    all.retain(|pose| !adopted.contains(pose) && !pose.is_of(Some(&cell)));
+    add_under_free_names(&mut poses, adopted);
+    all.extend(poses.into_iter().map(|pose| TaughtPose { cell: Some(cell.clone()), ..pose }));
+    edit(model, desk, Edit::SetTaught { change, poses: all });
+}
+
+fn import_taught(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
+    let asked = desk.files(FileTask::ReadPoses(file));
+    model.say_if_refused(text!("The poses were not read"), asked);
+}
+
+fn poses_read(model: &mut Model, desk: &SessionThreads, read: Vec<TaughtPose>) {
+    let count = read.len() as u32;
+    let mut poses = taught(model);
+    add_under_free_names(&mut poses, read);
+    edit_taught(model, desk, TaughtChange::Import(count), poses);
+}
+
+fn export_taught(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
+    let poses = taught(model);
+    let joints = poses.iter().find_map(|pose| match &pose.goal {
+        Goal::Joints(joints) => Some(joints.len()),
+        Goal::Tip(_) => None,
+    });
+    let is_prismatic = |joint: &usize| model.joint_kind(*joint) == JointKind::Prismatic;
+    let prismatic = (0..joints.unwrap_or(0)).filter(is_prismatic).collect();
+    let asked = desk.files(FileTask::WritePoses { file, poses, prismatic });
+    model.say_if_refused(text!("The poses were not written"), asked);
+}
+
+fn visit_taught(cx: &mut Context, name: &str) {
+    if may_set_out(&mut cx.model) {
+        go_to_taught(cx, name);
+    }
+}
+
+pub(crate) fn go_to_taught(cx: &mut Context, name: &str) {
+    let what = text!("pose {name}", name = name);
+    let goal = cx.model.taught().into_iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
+        Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
+        Goal::Joints(joints) => JointValues::try_from(&joints[..]).ok().map(MotionGoal::Joints),
+    });
+    match goal {
+        Some(Some(goal)) => set_out(cx, goal, what),
+        Some(None) => {
+            let why = text!("no arm has as many joints as the pose");
+            moved(cx, cx.numbers.motion, MotionOutcome::Refused(why));
         }
-        let mut poses = self.taught();
-        for pose in poses.iter_mut().filter(|pose| pose.name == from) {
-            to.clone_into(&mut pose.name);
-        }
-        self.edit_taught(TaughtChange::Rename { from: from.to_owned(), to: to.to_owned() }, poses);
-    }
-
-    pub(crate) fn reorder_taught(&mut self, name: &str, to: usize) {
-        let mut poses = self.taught();
-        let Some(from) = poses.iter().position(|pose| pose.name == name) else { return };
-        let pose = poses.remove(from);
-        poses.insert(to.min(poses.len()), pose);
-        self.edit_taught(TaughtChange::Reorder(name.to_owned()), poses);
-    }
-
-    pub(crate) fn teach_reference(&mut self) {
-        if self.model.has_reference_poses() {
-            self.edit_taught(TaughtChange::Replace, reference_poses());
-        }
-    }
-
-    /// A person says that arm, base and target are as they were where the poses were taught.
-    pub(crate) fn adopt_taught(&mut self) {
-        let Some(cell) = self.model.taught_on(self.model.document().meta.target) else { return };
-        let fits = |pose: &&TaughtPose| match &pose.goal {
-            Goal::Joints(joints) => joints.len() == cell.joints.len(),
-            Goal::Tip(_) => true,
-        };
-        let elsewhere = self.model.document().taught.iter().filter(|pose| !pose.is_of(Some(&cell)));
-        let (fit, others): (Vec<&TaughtPose>, Vec<&TaughtPose>) = elsewhere.partition(fits);
-        let (adopted, others) = (fit.into_iter().cloned().collect::<Vec<_>>(), others.len());
-        if others > 0 {
-            let said = text!("{n} {n|pose has|poses have} another number of joints than this arm", n = others);
-            self.say(Severity::Warning, said);
-        }
-        if adopted.is_empty() {
-            return;
-        }
-        let change = TaughtChange::Import(adopted.len() as u32);
-        let mut poses = self.taught();
-        let mut all = self.model.document().taught.clone();
-        all.retain(|pose| !adopted.contains(pose) && !pose.is_of(Some(&cell)));
-        add_under_free_names(&mut poses, adopted);
-        all.extend(poses.into_iter().map(|pose| TaughtPose { cell: Some(cell.clone()), ..pose }));
-        self.edit(Edit::SetTaught { change, poses: all });
-    }
-
-    pub(crate) fn import_taught(&mut self, file: PathBuf) {
-        let asked = self.desk.files(FileTask::ReadPoses(file));
-        self.expect(text!("The poses were not read"), asked);
-    }
-
-    pub(crate) fn poses_read(&mut self, read: Vec<TaughtPose>) {
-        let count = read.len() as u32;
-        let mut poses = self.taught();
-        add_under_free_names(&mut poses, read);
-        self.edit_taught(TaughtChange::Import(count), poses);
-    }
-
-    pub(crate) fn export_taught(&mut self, file: PathBuf) {
-        let poses = self.taught();
-        let joints = poses.iter().find_map(|pose| match &pose.goal {
-            Goal::Joints(joints) => Some(joints.len()),
-            Goal::Tip(_) => None,
-        });
-        let is_prismatic = |joint: &usize| self.model.joint_kind(*joint) == JointKind::Prismatic;
-        let prismatic = (0..joints.unwrap_or(0)).filter(is_prismatic).collect();
-        let asked = self.desk.files(FileTask::WritePoses { file, poses, prismatic });
-        self.expect(text!("The poses were not written"), asked);
-    }
-
-    pub(crate) fn visit_taught(&mut self, name: &str) {
-        if self.may_set_out() {
-            self.go_to_taught(name);
-        }
-    }
-
-    pub(crate) fn go_to_taught(&mut self, name: &str) {
-        let what = text!("pose {name}", name = name);
-        let goal = self.model.taught().into_iter().find(|pose| pose.name == name).map(|pose| match &pose.goal {
-            Goal::Tip(base_from_tip) => Some(MotionGoal::Tip(*base_from_tip)),
-            Goal::Joints(joints) => JointValues::try_from(&joints[..]).ok().map(MotionGoal::Joints),
-        });
-        match goal {
-            Some(Some(goal)) => self.set_out(goal, what),
-            Some(None) => {
-                let why = text!("no arm has as many joints as the pose");
-                self.moved(self.numbers.motion, MotionOutcome::Refused(why));
-            }
-            None => {
-                let why = text!("it is no longer taught");
-                self.moved(self.numbers.motion, MotionOutcome::Refused(why));
-            }
+        None => {
+            let why = text!("it is no longer taught");
+            moved(cx, cx.numbers.motion, MotionOutcome::Refused(why));
         }
     }
 }

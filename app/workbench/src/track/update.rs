@@ -4,141 +4,159 @@ use std::sync::Arc;
 
 use handeye_track::{MotionModel, Setup};
 
-use crate::app::App;
+use super::command::{Command, Event};
+use crate::app::Numbers;
 use crate::model::{
-    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, Motion, MotionId, MotionOutcome, Pane, Severity,
+    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, Model, Motion, MotionId, MotionOutcome, Pane, Severity,
     TrackPoint, Tracked,
 };
 use crate::text::Text;
-use crate::worker::{ControlTask, Request, VisionTask};
+use crate::worker::{ControlTask, Request, VisionTask, Workers};
 use handeye_wording::text;
 
 /// χ² of three degrees of freedom at 95 %, as a radius.
 const RADIUS_95: f64 = 2.795_483_482_915_108;
 
-impl App {
-    pub(crate) fn set_tracking(&mut self, on: bool) {
-        if on && self.model.calibrated().is_none() {
-            self.say(Severity::Warning, text!("Tracking needs a calibration: capture poses and solve first"));
-            return;
-        }
-        let before = std::mem::replace(&mut self.model.track.on, on);
-        if before != on {
-            self.model.track.newest = None;
-            self.model.track.history.clear();
-            self.send_tracking();
-        }
-        if !on {
-            self.set_follow(None);
-        }
+/// Does what is wanted of tracking and following.
+pub(crate) fn apply(model: &mut Model, workers: &Workers, numbers: &mut Numbers, command: Command) {
+    match command {
+        Command::SetTracking(on) => set_tracking(model, workers, numbers, on),
+        Command::SetFollow(wish) => set_follow(model, workers, numbers, wish),
+        Command::MoveBoard(motion) => move_board(model, workers, motion),
+        Command::HideBoard(hidden) => hide_board(model, workers, hidden),
     }
+}
 
-    /// Has the vision thread track with the newest calibration, or no more.
-    pub(crate) fn send_tracking(&mut self) {
-        let setup = self.model.calibrated().filter(|_| self.model.track.on).map(|calibrated| {
-            Box::new(Setup {
-                target: self.model.document().meta.target,
-                calibrated: calibrated.clone(),
-                motion: MotionModel::default(),
-            })
-        });
-        let asked = self.workers.ask_vision(VisionTask::Track(setup));
-        self.expect(text!("Tracking was not changed"), asked);
+/// Takes in where the board is, and how following goes.
+pub(crate) fn absorb(model: &mut Model, workers: &Workers, numbers: &mut Numbers, event: Event) {
+    match event {
+        Event::Tracked(newest) => tracked(model, newest),
+        Event::Failed { why } => track_failed(model, workers, numbers, why),
+        Event::Follow(status) => follow_goes(model, numbers, status),
     }
+}
 
-    pub(crate) fn tracked(&mut self, tracked: Arc<Tracked>) {
-        let track = &mut self.model.track;
-        // What was on its way when tracking was ended.
-        if !track.on {
-            return;
-        }
-        let estimate = tracked.update.estimate.as_ref();
-        let radius_m = |covariance: &nalgebra::Matrix6<f64>| {
-            let largest = covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues().max();
-            largest.max(0.0).sqrt() * RADIUS_95
-        };
-        track.history.push_back(TrackPoint {
-            time_s: tracked.update.time_s,
-            position_m: estimate.map(|estimate| estimate.base_from_target.translation().into()),
-            position_95_m: estimate.map(|estimate| radius_m(&estimate.covariance)),
-            error: tracked.error,
-            latency_s: tracked.latency_s,
-        });
-        while track.history.len() > MAX_TRACK_POINTS {
-            track.history.pop_front();
-        }
-        track.newest = Some(tracked);
+pub(crate) fn set_tracking(model: &mut Model, workers: &Workers, numbers: &mut Numbers, on: bool) {
+    if on && model.calibrated().is_none() {
+        model.say(Severity::Warning, text!("Tracking needs a calibration: capture poses and solve first"));
+        return;
     }
+    let before = std::mem::replace(&mut model.track.on, on);
+    if before != on {
+        model.track.newest = None;
+        model.track.history.clear();
+        send_tracking(model, workers);
+    }
+    if !on {
+        set_follow(model, workers, numbers, None);
+    }
+}
 
-    pub(crate) fn track_failed(&mut self, why: Text) {
-        self.say(Severity::Error, text!("The board is not tracked: {why}", why = why));
-        self.set_tracking(false);
-    }
+/// Has the vision thread track with the newest calibration, or no more.
+pub(crate) fn send_tracking(model: &mut Model, workers: &Workers) {
+    let setup = model.calibrated().filter(|_| model.track.on).map(|calibrated| {
+        Box::new(Setup {
+            target: model.document().meta.target,
+            calibrated: calibrated.clone(),
+            motion: MotionModel::default(),
+        })
+    });
+    let asked = workers.ask_vision(VisionTask::Track(setup));
+    model.say_if_refused(text!("Tracking was not changed"), asked);
+}
 
-    pub(crate) fn set_follow(&mut self, wish: Option<FollowWish>) {
-        self.model.track.wish = wish;
-        let Some(wish) = wish else {
-            if self.numbers.follow.is_some() {
-                self.workers.cancel_motion();
-            }
-            return;
-        };
-        if !self.model.track.on {
-            self.follow_ended(MotionOutcome::Refused(text!("The board is not tracked: start tracking first")));
-            return;
-        }
-        self.numbers.motion = MotionId(self.numbers.motion.0 + 1);
-        let id = self.numbers.motion;
-        match self.workers.follow(id, wish, self.model.speed()) {
-            Ok(()) => {
-                self.numbers.follow = Some(id);
-                self.model.track.follow = FollowStatus::Off;
-                let what = text!("the board");
-                self.model.motion = Motion::Moving { id, what, since_s: self.model.now_s };
-                self.say(Severity::Info, text!("The arm follows the board"));
-            }
-            Err(busy) => self.follow_ended(MotionOutcome::Refused(busy.into())),
-        }
+fn tracked(model: &mut Model, tracked: Arc<Tracked>) {
+    let track = &mut model.track;
+    // What was on its way when tracking was ended.
+    if !track.on {
+        return;
     }
+    let estimate = tracked.update.estimate.as_ref();
+    let radius_m = |covariance: &nalgebra::Matrix6<f64>| {
+        let largest = covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues().max();
+        largest.max(0.0).sqrt() * RADIUS_95
+    };
+    track.history.push_back(TrackPoint {
+        time_s: tracked.update.time_s,
+        position_m: estimate.map(|estimate| estimate.base_from_target.translation().into()),
+        position_95_m: estimate.map(|estimate| radius_m(&estimate.covariance)),
+        error: tracked.error,
+        latency_s: tracked.latency_s,
+    });
+    while track.history.len() > MAX_TRACK_POINTS {
+        track.history.pop_front();
+    }
+    track.newest = Some(tracked);
+}
 
-    /// Following goes on. What was on its way when it ended says nothing now.
-    pub(crate) fn follow_goes(&mut self, status: FollowStatus) {
-        if self.numbers.follow.is_some() {
-            self.model.track.follow = status;
-        }
-    }
+fn track_failed(model: &mut Model, workers: &Workers, numbers: &mut Numbers, why: Text) {
+    model.say(Severity::Error, text!("The board is not tracked: {why}", why = why));
+    set_tracking(model, workers, numbers, false);
+}
 
-    pub(crate) fn follow_ended(&mut self, outcome: MotionOutcome) {
-        self.numbers.follow = None;
-        self.model.track.wish = None;
-        let (severity, why) = match outcome {
-            MotionOutcome::Arrived | MotionOutcome::Stopped => (Severity::Info, text!("it was stopped")),
-            MotionOutcome::Refused(why)
-            | MotionOutcome::Unreached(why)
-            | MotionOutcome::Failed(why)
-            | MotionOutcome::Held(why) => (Severity::Warning, why),
-        };
-        let said = text!("The arm does not follow the board: {why}", why = why.clone());
-        match severity {
-            Severity::Info => self.say(severity, said),
-            _ => self.say_in(Pane::Track, severity, said),
+fn set_follow(model: &mut Model, workers: &Workers, numbers: &mut Numbers, wish: Option<FollowWish>) {
+    model.track.wish = wish;
+    let Some(wish) = wish else {
+        if numbers.follow.is_some() {
+            workers.cancel_motion();
         }
-        self.model.track.follow = FollowStatus::Ended(why);
+        return;
+    };
+    if !model.track.on {
+        follow_ended(model, numbers, MotionOutcome::Refused(text!("The board is not tracked: start tracking first")));
+        return;
     }
+    numbers.motion = MotionId(numbers.motion.0 + 1);
+    let id = numbers.motion;
+    match workers.follow(id, wish, model.speed()) {
+        Ok(()) => {
+            numbers.follow = Some(id);
+            model.track.follow = FollowStatus::Off;
+            let what = text!("the board");
+            model.motion = Motion::Moving { id, what, since_s: model.now_s };
+            model.say(Severity::Info, text!("The arm follows the board"));
+        }
+        Err(busy) => follow_ended(model, numbers, MotionOutcome::Refused(busy.into())),
+    }
+}
 
-    pub(crate) fn move_board(&mut self, motion: BoardMotion) {
-        let asked = self.workers.ask_control(Request::Do(ControlTask::MoveBoard(motion)));
-        if asked.is_ok() {
-            self.model.track.board = motion;
-        }
-        self.expect(text!("The board was not moved"), asked);
+/// Following goes on. What was on its way when it ended says nothing now.
+fn follow_goes(model: &mut Model, numbers: &Numbers, status: FollowStatus) {
+    if numbers.follow.is_some() {
+        model.track.follow = status;
     }
+}
 
-    pub(crate) fn hide_board(&mut self, hidden: bool) {
-        let asked = self.workers.ask_control(Request::Do(ControlTask::HideBoard(hidden)));
-        if asked.is_ok() {
-            self.model.track.board_hidden = hidden;
-        }
-        self.expect(text!("The board was not hidden"), asked);
+pub(crate) fn follow_ended(model: &mut Model, numbers: &mut Numbers, outcome: MotionOutcome) {
+    numbers.follow = None;
+    model.track.wish = None;
+    let (severity, why) = match outcome {
+        MotionOutcome::Arrived | MotionOutcome::Stopped => (Severity::Info, text!("it was stopped")),
+        MotionOutcome::Refused(why)
+        | MotionOutcome::Unreached(why)
+        | MotionOutcome::Failed(why)
+        | MotionOutcome::Held(why) => (Severity::Warning, why),
+    };
+    let said = text!("The arm does not follow the board: {why}", why = why.clone());
+    match severity {
+        Severity::Info => model.say(severity, said),
+        _ => model.say_in(Pane::Track, severity, said),
     }
+    model.track.follow = FollowStatus::Ended(why);
+}
+
+fn move_board(model: &mut Model, workers: &Workers, motion: BoardMotion) {
+    let asked = workers.ask_control(Request::Do(ControlTask::MoveBoard(motion)));
+    if asked.is_ok() {
+        model.track.board = motion;
+    }
+    model.say_if_refused(text!("The board was not moved"), asked);
+}
+
+fn hide_board(model: &mut Model, workers: &Workers, hidden: bool) {
+    let asked = workers.ask_control(Request::Do(ControlTask::HideBoard(hidden)));
+    if asked.is_ok() {
+        model.track.board_hidden = hidden;
+    }
+    model.say_if_refused(text!("The board was not hidden"), asked);
 }
