@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use crossbeam_channel::{Receiver, Sender};
+use crossbeam_channel::Receiver;
+use handeye_workbench::worker::channels::Bell;
 use serde::Serialize;
 use tokio::sync::watch;
 
@@ -31,7 +32,7 @@ const FIRST: PageId = 1;
 /// Between the pages and the window.
 pub struct Hub {
     state: Mutex<State>,
-    wake: Sender<()>,
+    bell: Bell,
     stop: Arc<StopLine>,
     frames: watch::Sender<(u64, Arc<Frame>)>,
     people: watch::Sender<People>,
@@ -134,19 +135,19 @@ const MOST_ERRANDS: usize = 16;
 impl Hub {
     /// Nobody is there; what wakes the window comes out of the second.
     pub fn new(stop: Arc<StopLine>) -> (Self, Receiver<()>) {
-        let (wake, wakes) = crossbeam_channel::bounded(1);
+        let (bell, rung) = Bell::new();
         let (pages, news, stop_places) = (BTreeMap::new(), News::default(), StopPlaces::default());
         let state = State { next: FIRST, pages, driver: None, drove: None, news, stop_places };
         let hub = Self {
             state: Mutex::new(state),
-            wake,
+            bell,
             stop,
             frames: watch::Sender::default(),
             people: watch::Sender::default(),
             words: watch::Sender::default(),
             controls: watch::Sender::new(Arc::default()),
         };
-        (hub, wakes)
+        (hub, rung)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -155,8 +156,7 @@ impl Hub {
 
     /// Has the window look.
     pub fn wake(&self) {
-        // Full: it is going to look anyway.
-        let _woken = self.wake.try_send(()).is_ok();
+        self.bell.ring();
     }
 
     fn tell_people(&self, state: &State) {

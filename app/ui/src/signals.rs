@@ -61,12 +61,13 @@ mod tests {
     use handeye_workbench::connect::stop_line::Ends;
     use handeye_workbench::model::{MotionGoal, MotionId, MotionRequest};
     use handeye_workbench::motion::desk::{MotionQueue, MotionTask, Work};
+    use handeye_workbench::worker::channels::Requests;
 
     #[test]
     fn a_signal_ends_what_moves_whatever_the_window_does() {
         let (stop, waker): (Arc<StopLine>, Waker) = (Arc::default(), Arc::new(|| {}));
         let desk = Arc::new(MotionQueue::new(Arc::clone(stop.grip()), Arc::clone(&waker)));
-        let (control, _requests) = crossbeam_channel::bounded(1);
+        let (control, _requests) = Requests::with_limit(1);
         stop.lead_to(Ends { desk: Arc::clone(&desk), control, clock: Arc::new(|| 0.0) });
         let signals = Signals::default();
         signals.lead_to(Arc::clone(&stop), waker);

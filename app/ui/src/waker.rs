@@ -5,9 +5,8 @@ use std::sync::Arc;
 use std::thread::Builder;
 use std::time::Duration;
 
-use crossbeam_channel::bounded;
-
 use handeye_workbench::worker::Waker;
+use handeye_workbench::worker::channels::Bell;
 
 /// What the workers report within this time is drawn at once: an image and the board in it, the robot's state.
 const GATHER: Duration = Duration::from_millis(20);
@@ -18,16 +17,15 @@ const GATHER: Duration = Duration::from_millis(20);
 /// # Errors
 /// When the system has no more threads.
 pub fn waker_of(ctx: &egui::Context) -> io::Result<Waker> {
-    let (wake, wakes) = bounded(1);
+    let (bell, rung) = Bell::new();
     let ctx = ctx.clone();
     Builder::new().name("waker".to_owned()).spawn(move || {
-        for () in wakes {
+        for () in rung {
             ctx.request_repaint_after(GATHER);
         }
     })?;
     Ok(Arc::new(move || {
-        // Full: it is going to ask anyway.
-        let _woken = wake.try_send(()).is_ok();
+        bell.ring();
     }))
 }
 

@@ -1,13 +1,11 @@
 //! The way of a stop to the arm, for every thread.
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-use crossbeam_channel::Sender;
 
 use super::worker::ControlTask;
 use crate::motion::desk::MotionQueue;
 use crate::motion::grip::Grip;
+use crate::worker::channels::{Counter, Requests};
 use crate::worker::{Clock, Request};
 
 /// Stops the arm from any thread. Nothing in here waits: a stop is a count that the control worker looks at before anything
@@ -18,12 +16,9 @@ use crate::worker::{Clock, Request};
 /// begins.
 #[derive(Default)]
 pub struct StopLine {
-    pressed: AtomicU64,
-    done: AtomicU64,
-    /// Stops that other threads pressed than the one that draws.
-    outside: AtomicU64,
-    /// How many of these the thread that draws has taken note of.
-    noted: AtomicU64,
+    stops: Counter,
+    /// Those that other threads pressed than the one that draws, done when that has taken note of them.
+    outside: Counter,
     ends: Mutex<Option<Ends>>,
     grip: Arc<Grip>,
 }
@@ -33,7 +28,7 @@ pub struct Ends {
     /// The motions that wait.
     pub desk: Arc<MotionQueue>,
     /// The thread that controls the simulation.
-    pub control: Sender<Request<ControlTask>>,
+    pub control: Requests<Request<ControlTask>>,
     /// The time of the window.
     pub clock: Clock,
 }
@@ -46,17 +41,17 @@ impl StopLine {
 
     /// Asks for a stop. What this program moves ends at once, and nothing is left that could begin afterwards.
     pub fn press(&self) {
-        self.pressed.fetch_add(1, Ordering::AcqRel);
+        self.stops.ask();
         if let Some(ends) = self.ends().as_ref() {
             ends.desk.cancel((ends.clock)());
             // Only to wake a resting worker: one that is too busy to take it looks at the line by itself.
-            let _full = ends.control.try_send(Request::Do(ControlTask::CheckStop)).is_err();
+            let _full = ends.control.ask(Request::Do(ControlTask::CheckStop)).is_err();
         }
     }
 
     /// The same from a thread that does not draw; returns the number that [`Self::note`] takes.
     pub fn press_outside(&self) -> u64 {
-        let number = self.outside.fetch_add(1, Ordering::AcqRel) + 1;
+        let number = self.outside.ask();
         self.press();
         number
     }
@@ -71,12 +66,12 @@ impl StopLine {
 
     /// How many stops were pressed outside of the thread that draws.
     pub fn outside(&self) -> u64 {
-        self.outside.load(Ordering::Acquire)
+        self.outside.asked()
     }
 
     /// The thread that draws has taken note of so many of them: what it asks for from now on was asked for after them.
     pub fn note(&self, number: u64) {
-        self.noted.fetch_max(number, Ordering::AcqRel);
+        self.outside.finish(number);
     }
 
     /// Whether a stop is asked for and not done.
@@ -86,18 +81,17 @@ impl StopLine {
 
     /// Whether nothing that moves may begin now.
     pub fn is_barred(&self) -> bool {
-        self.is_pressed() || self.outside() > self.noted.load(Ordering::Acquire)
+        self.is_pressed() || self.outside.open().is_some()
     }
 
     /// The number of the newest stop that is not done.
     pub(crate) fn wanted(&self) -> Option<u64> {
-        let pressed = self.pressed.load(Ordering::Acquire);
-        (pressed > self.done.load(Ordering::Acquire)).then_some(pressed)
+        self.stops.open()
     }
 
     /// Stops up to this one are done. One that was pressed meanwhile is not.
     pub(crate) fn finish(&self, number: u64) {
-        self.done.fetch_max(number, Ordering::AcqRel);
+        self.stops.finish(number);
     }
 
     /// From now on a stop reaches these.

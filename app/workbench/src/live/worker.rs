@@ -9,9 +9,9 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 
 use crate::live::depth;
 use crate::model::{ColouredDepth, DepthScale, FrameImages, FrameInfo, Link, LiveFrame, ViewSettings};
+use crate::worker::channels::{LatestSlot, Tap};
 use crate::worker::link::{Duty, Outlet};
 use crate::worker::rate::RateMeter;
-use crate::worker::slot::{LatestSlot, Tap};
 use handeye_link::{CameraPort, Cell, Connected, Newest, PortError, RawFrame};
 use handeye_wording::text;
 

@@ -16,6 +16,7 @@ use crate::import::worker::{ImportJob, perform};
 use crate::solve::observer::{self, ObserveJob};
 use crate::solve::worker::SolveJob;
 use crate::solve::worker::solve;
+use crate::worker::channels::Requests;
 use crate::worker::files::{self, FileTask};
 use crate::worker::link::Outlet;
 use crate::worker::newest::NewestWins;
@@ -27,9 +28,9 @@ const MAX_CAPTURES: usize = 4;
 
 /// The application's end of these threads.
 pub struct SessionThreads {
-    archive: Option<Sender<ArchiveTask>>,
+    archive: Requests<ArchiveTask>,
     captures: Sender<Measured>,
-    files: Option<Sender<FileTask>>,
+    files: Requests<FileTask>,
     observer: NewestWins<ObserveJob>,
     solver: NewestWins<SolveJob>,
     chooser: NewestWins<HandJob>,
@@ -47,11 +48,11 @@ impl SessionThreads {
     pub fn start(sessions: PathBuf, clock: &Clock, waker: &Waker) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
-        let (archive, archive_tasks) = bounded(MAX_REQUESTS);
+        let (archive, archive_tasks) = Requests::with_limit(MAX_REQUESTS);
         let (captures, measured) = bounded(MAX_CAPTURES);
         let keeper = Archive::new(sessions.clone(), outlet());
         let archiving = Started::spawn("archive", move || keeper.run(&archive_tasks, &measured))?;
-        let (files, file_tasks) = bounded::<FileTask>(MAX_REQUESTS);
+        let (files, file_tasks) = Requests::<FileTask>::with_limit(MAX_REQUESTS);
         let out = outlet();
         let filing = Started::spawn("files", move || {
             for task in &file_tasks {
@@ -68,9 +69,9 @@ impl SessionThreads {
         let out = outlet();
         let (importer, importing) = NewestWins::start("importer", move |job, cancel| perform(&job, cancel, &out))?;
         Ok(Self {
-            archive: Some(archive),
+            archive,
             captures,
-            files: Some(files),
+            files,
             observer,
             solver,
             chooser,
@@ -103,7 +104,7 @@ impl SessionThreads {
     /// # Errors
     /// [`Busy`] when the disk does not keep up.
     pub fn archive(&self, task: ArchiveTask) -> Result<(), Busy> {
-        hand_in(self.archive.as_ref(), task)
+        self.archive.ask(task)
     }
 
     /// Asks for reading or writing.
@@ -111,7 +112,7 @@ impl SessionThreads {
     /// # Errors
     /// [`Busy`] when the disk does not keep up.
     pub fn files(&self, task: FileTask) -> Result<(), Busy> {
-        hand_in(self.files.as_ref(), task)
+        self.files.ask(task)
     }
 
     /// Has captures looked at, these alone.
@@ -162,7 +163,8 @@ impl SessionThreads {
         solver.end();
         chooser.end();
         importer.end();
-        (*archive, *files) = (None, None);
+        archive.close();
+        files.close();
         for thread in threads.drain(..) {
             // A thread whose report nobody takes would wait for ever.
             while thread.is_running() && Instant::now() < end {
@@ -177,10 +179,6 @@ impl Drop for SessionThreads {
     fn drop(&mut self) {
         self.end(Instant::now() + JOIN_DEADLINE);
     }
-}
-
-fn hand_in<Task>(worker: Option<&Sender<Task>>, task: Task) -> Result<(), Busy> {
-    worker.map_or(Err(Busy), |worker| worker.try_send(task).map_err(|_full| Busy))
 }
 
 #[cfg(test)]

@@ -10,13 +10,13 @@
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
 //! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
 
+pub mod channels;
 pub(crate) mod files;
 pub(crate) mod link;
 pub(crate) mod newest;
 pub(crate) mod rate;
 pub(crate) mod reconnect;
 mod shared;
-pub(crate) mod slot;
 pub(crate) mod started;
 mod vision;
 
@@ -29,7 +29,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use handeye_coppeliasim::CancelToken;
 use handeye_geometry::frames::{Camera as CameraFrame, Pose, Tip};
 use handeye_plan::Surroundings;
@@ -52,7 +52,6 @@ pub use handeye_link::{
     ViewsRequest, end_of_following,
 };
 pub use link::Request;
-pub use slot::LatestSlot;
 pub use started::Started;
 pub use vision::VisionTask;
 
@@ -67,17 +66,17 @@ use crate::model::{
 };
 use crate::motion::worker::Motions;
 use crate::{connect, live, track};
+use channels::{LatestSlot, Requests, Tap};
 use link::{Duty, LinkLoop, Outlet};
 use reconnect::Reconnect;
-use slot::Tap;
 use vision::{Vision, VisionSlots};
 
 /// The application's end of the workers.
 pub struct Workers {
-    control: Option<Sender<Request<ControlTask>>>,
-    camera: Option<Sender<Request<CameraTask>>>,
-    motion: Option<Sender<Request<MotionLook>>>,
-    vision: Option<Sender<VisionTask>>,
+    control: Requests<Request<ControlTask>>,
+    camera: Requests<Request<CameraTask>>,
+    motion: Requests<Request<MotionLook>>,
+    vision: Requests<VisionTask>,
     /// Those of the control worker come last: that the arm was stopped is told after what the stop ended.
     events: Option<[Receiver<Event>; 2]>,
     stop: Arc<StopLine>,
@@ -118,14 +117,14 @@ impl Workers {
         };
         let outlet = || outlet_to(&event_sender);
         let duty = Control::new(source, Arc::clone(&workers.stop), Arc::clone(&workers.robot));
-        workers.control = Some(workers.spawn("control", duty, source, connector, outlet_to(&control_sender))?);
+        workers.control = workers.spawn("control", duty, source, connector, outlet_to(&control_sender))?;
         let (tap, bell) = Tap::new();
         let tap = Arc::new(tap);
         let duty = Camera::new(view, Arc::clone(&workers.frames), Arc::clone(&tap));
-        workers.camera = Some(workers.spawn("camera", duty, source, connector, outlet())?);
+        workers.camera = workers.spawn("camera", duty, source, connector, outlet())?;
         let duty = Motions::new(Arc::clone(&workers.desk), Arc::clone(&workers.follow));
-        workers.motion = Some(workers.spawn("motion", duty, source, connector, outlet())?);
-        let (sender, tasks) = bounded(MAX_REQUESTS);
+        workers.motion = workers.spawn("motion", duty, source, connector, outlet())?;
+        let (requests, tasks) = Requests::with_limit(MAX_REQUESTS);
         let sights = VisionSlots {
             detections: Arc::clone(&workers.detections),
             tracked: Arc::clone(&workers.tracked),
@@ -133,7 +132,7 @@ impl Workers {
         };
         let vision = Vision::new(tap, bell, tasks, sights, captures, outlet(), workers.shutdown.clone());
         workers.run("vision", move || vision.run())?;
-        workers.vision = Some(sender);
+        workers.vision = requests;
         workers.lead_stop();
         Ok(workers)
     }
@@ -147,10 +146,10 @@ impl Workers {
         waker: &Waker,
     ) -> Self {
         Self {
-            control: None,
-            camera: None,
-            motion: None,
-            vision: None,
+            control: Requests::default(),
+            camera: Requests::default(),
+            motion: Requests::default(),
+            vision: Requests::default(),
             events: Some(events),
             stop: Arc::clone(stop),
             desk: Arc::new(MotionQueue::new(Arc::clone(stop.grip()), Arc::clone(waker))),
@@ -168,8 +167,8 @@ impl Workers {
 
     /// From now on a stop reaches these threads.
     fn lead_stop(&self) {
-        let Some(control) = self.control.clone() else { return };
-        self.stop.lead_to(Ends { desk: Arc::clone(&self.desk), control, clock: Arc::clone(&self.clock) });
+        let (desk, control, clock) = (Arc::clone(&self.desk), self.control.clone(), Arc::clone(&self.clock));
+        self.stop.lead_to(Ends { desk, control, clock });
     }
 
     fn spawn<D: Duty + 'static>(
@@ -179,8 +178,8 @@ impl Workers {
         source: &CellSource,
         connector: &Arc<dyn Cell>,
         outlet: Outlet,
-    ) -> io::Result<Sender<Request<D::Task>>> {
-        let (sender, requests) = bounded(MAX_REQUESTS);
+    ) -> io::Result<Requests<Request<D::Task>>> {
+        let (sender, requests) = Requests::with_limit(MAX_REQUESTS);
         let reconnect = Reconnect::new(source.clone());
         let connector = Arc::clone(connector);
         let shutdown = self.shutdown.clone();
@@ -309,7 +308,7 @@ impl Workers {
     }
 
     fn begin(&self, task: MotionTask) -> Result<(), Busy> {
-        if self.motion.is_none() {
+        if self.motion.is_closed() {
             return Err(Busy);
         }
         self.desk.ask(task, &self.stop);
@@ -319,7 +318,7 @@ impl Workers {
 
     /// A worker that is too busy to be woken looks at the desk by itself.
     fn wake_motion(&self) {
-        let woken = ask(self.motion.as_ref(), Request::Do(MotionLook));
+        let woken = self.motion.ask(Request::Do(MotionLook));
         tracing::trace!(?woken, "the motion worker was told to look");
     }
 
@@ -346,7 +345,7 @@ impl Workers {
     }
 
     fn look_at_connection(&self) -> Result<(), Busy> {
-        let motion = ask(self.motion.as_ref(), Request::Reconnect);
+        let motion = self.motion.ask(Request::Reconnect);
         self.ask_control(Request::Reconnect).and(self.ask_camera(Request::Reconnect)).and(motion)
     }
 
@@ -355,7 +354,7 @@ impl Workers {
     /// # Errors
     /// [`Busy`] when it does not take requests.
     pub fn ask_control(&self, request: Request<ControlTask>) -> Result<(), Busy> {
-        ask(self.control.as_ref(), request)
+        self.control.ask(request)
     }
 
     /// Asks the camera worker for something.
@@ -363,7 +362,7 @@ impl Workers {
     /// # Errors
     /// [`Busy`] when it does not take requests.
     pub fn ask_camera(&self, request: Request<CameraTask>) -> Result<(), Busy> {
-        ask(self.camera.as_ref(), request)
+        self.camera.ask(request)
     }
 
     /// Asks the vision thread for something.
@@ -371,7 +370,7 @@ impl Workers {
     /// # Errors
     /// [`Busy`] when it does not take requests.
     pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
-        ask(self.vision.as_ref(), task)
+        self.vision.ask(task)
     }
 
     /// Whether this program moves the arm, or is about to.
@@ -398,10 +397,10 @@ impl Workers {
     pub fn shut_down(&mut self, deadline: Duration) -> usize {
         self.shutdown.cancel();
         self.stop.lead_away_from(&self.desk);
-        self.control = None;
-        self.camera = None;
-        self.motion = None;
-        self.vision = None;
+        self.control.close();
+        self.camera.close();
+        self.motion.close();
+        self.vision.close();
         self.events = None;
         self.connector = None;
         let end = Instant::now() + deadline;
@@ -412,13 +411,6 @@ impl Workers {
 impl Drop for Workers {
     fn drop(&mut self) {
         self.shut_down(JOIN_DEADLINE);
-    }
-}
-
-fn ask<T>(worker: Option<&Sender<T>>, request: T) -> Result<(), Busy> {
-    match worker.map(|worker| worker.try_send(request)) {
-        Some(Ok(())) => Ok(()),
-        Some(Err(TrySendError::Full(_) | TrySendError::Disconnected(_))) | None => Err(Busy),
     }
 }
 

@@ -3,17 +3,16 @@
 use std::io;
 use std::sync::Arc;
 
-use crossbeam_channel::{Sender, TrySendError, bounded};
 use handeye_coppeliasim::CancelToken;
 
-use super::slot::LatestSlot;
+use super::channels::{Bell, LatestSlot};
 use super::started::Started;
 
 /// Runs one job at a time. A job that is handed in takes the place of the one that waits and cancels the one that
 /// runs, so that the answer to the newest question comes as soon as it can.
 pub struct NewestWins<Job> {
     jobs: Arc<LatestSlot<(Job, CancelToken)>>,
-    wake: Option<Sender<()>>,
+    wake: Option<Bell>,
     running: CancelToken,
 }
 
@@ -24,7 +23,7 @@ impl<Job: Send + 'static> NewestWins<Job> {
     /// When the system has no more threads.
     pub fn start(name: &str, mut work: impl FnMut(Job, &CancelToken) + Send + 'static) -> io::Result<(Self, Started)> {
         let jobs: Arc<LatestSlot<(Job, CancelToken)>> = Arc::default();
-        let (wake, woken) = bounded::<()>(1);
+        let (wake, woken) = Bell::new();
         let waiting = Arc::clone(&jobs);
         let started = Started::spawn(name, move || {
             while woken.recv().is_ok() {
@@ -43,7 +42,7 @@ impl<Job: Send + 'static> NewestWins<Job> {
         self.cancel();
         self.running = CancelToken::default();
         self.jobs.put((job, self.running.clone()));
-        if let Some(Err(TrySendError::Disconnected(()))) = self.wake.as_ref().map(|wake| wake.try_send(())) {
+        if self.wake.as_ref().is_some_and(|wake| !wake.ring()) {
             tracing::error!("a worker has ended before the application");
         }
     }
@@ -63,6 +62,8 @@ impl<Job: Send + 'static> NewestWins<Job> {
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
+
+    use crossbeam_channel::bounded;
 
     use super::*;
 

@@ -20,8 +20,8 @@ use image::GrayImage;
 
 use search::Search;
 
+use super::channels::{LatestSlot, Tap};
 use super::link::Outlet;
-use super::slot::{LatestSlot, Tap};
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
 use crate::track::follow_line::FollowLine;
