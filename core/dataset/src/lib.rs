@@ -42,6 +42,7 @@ mod outside;
 pub mod pose_record;
 mod poses;
 mod target_table;
+#[cfg(feature = "taught_poses")]
 pub mod taught_poses;
 pub mod template;
 mod text;
@@ -54,13 +55,13 @@ pub use images::holds_images;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "pixels")]
 use image::{GrayImage, RgbImage};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use handeye_estimate::handeye::Mode;
 use handeye_files::bounds::Bounds;
-use handeye_files::digest::Listing;
 pub use handeye_files::own_folder::DESCRIPTION;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -97,8 +98,11 @@ pub struct Dataset {
     /// What the tables name outside of the folder, through `../`.
     pub outside: Vec<String>,
     pose_table: Option<PathBuf>,
-    /// Name in the data set and SHA-256 of every text file.
-    sources: Vec<(String, [u8; 32])>,
+    /// Names in the data set of the text files.
+    text_files: Vec<String>,
+    /// Their SHA-256.
+    #[cfg(feature = "digest")]
+    text_sha256: Vec<[u8; 32]>,
 }
 
 /// What `[camera]` says.
@@ -186,7 +190,10 @@ impl Dataset {
         let joints = config.robot.as_ref().and_then(|robot| robot.joints.as_ref());
         let arm = joints.and_then(|joints| joints.arm.clone()).map(|model| DatasetArm::of(model, &mut out));
         let files = [Some(&description), poses_file.as_ref(), corners_file.as_ref(), target_poses_file.as_ref()];
-        let sources = files.into_iter().flatten().map(|f| (f.name.display().to_string(), f.sha256)).collect();
+        let files: Vec<&TextFile> = files.into_iter().flatten().collect();
+        let text_files = files.iter().map(|file| file.name.display().to_string()).collect();
+        #[cfg(feature = "digest")]
+        let text_sha256 = files.iter().map(|file| file.sha256).collect();
         Ok(Self {
             folder: folder.to_path_buf(),
             mode: config.robot.as_ref().and(config.mode),
@@ -197,7 +204,30 @@ impl Dataset {
             arm,
             outside: outside.said(poses_file.as_ref()),
             pose_table: poses_file.map(|f| f.path),
-            sources,
+            text_files,
+            #[cfg(feature = "digest")]
+            text_sha256,
+        })
+    }
+
+    /// Names in the data set and paths of its text files, as they begin the listing of `input_sha256`.
+    pub fn text_files(&self) -> impl Iterator<Item = (&str, PathBuf)> {
+        self.text_files.iter().map(|name| (name.as_str(), self.folder.join(name)))
+    }
+
+    /// The name in the data set of the image of a view, where it has one.
+    pub fn image_name(&self, entry: &Entry) -> Option<String> {
+        let path = entry.image_path.as_deref()?;
+        Some(path.strip_prefix(&self.folder).unwrap_or(path).display().to_string())
+    }
+
+    /// The file of that image, as it is.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when it is gone, naming its row in the pose table.
+    pub fn image_bytes(&self, entry: &Entry) -> Result<Vec<u8>, DatasetError> {
+        self.load(entry, |path| {
+            std::fs::read(path).map_err(|e| ImageFileError::Unreadable(handeye_wording::foreign(&e)))
         })
     }
 
@@ -205,6 +235,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError`] when it is damaged, truncated or gone, naming its row in the pose table.
+    #[cfg(feature = "pixels")]
     pub fn load_rgb(&self, entry: &Entry) -> Result<RgbImage, DatasetError> {
         self.load(entry, handeye_images::load_rgb)
     }
@@ -213,6 +244,7 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Self::load_rgb`].
+    #[cfg(feature = "pixels")]
     pub fn load_gray(&self, entry: &Entry) -> Result<GrayImage, DatasetError> {
         self.load(entry, handeye_images::load_gray)
     }
@@ -235,16 +267,16 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError`] when an image can no longer be read.
+    #[cfg(feature = "digest")]
     pub fn input_sha256(&self) -> Result<String, DatasetError> {
-        let mut listing = Listing::default();
-        for (name, digest) in &self.sources {
+        let mut listing = handeye_files::digest::Listing::default();
+        for (name, digest) in self.text_files.iter().zip(&self.text_sha256) {
             listing.add_digest(name, digest);
         }
         for entry in &self.entries {
-            let Some(path) = &entry.image_path else { continue };
-            let name = path.strip_prefix(&self.folder).unwrap_or(path).display().to_string();
-            let unreadable = |e| ImageFileError::Unreadable(handeye_wording::foreign(&e));
-            self.load(entry, |path| listing.add_file(&name, path).map_err(unreadable))?;
+            if let Some(name) = self.image_name(entry) {
+                listing.add(&name, &self.image_bytes(entry)?);
+            }
         }
         Ok(listing.digest())
     }

@@ -3,8 +3,6 @@
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use sha2::{Digest as _, Sha256};
-
 use super::error::{DatasetError, DatasetProblem, shown};
 use handeye_wording::one_line;
 
@@ -18,6 +16,7 @@ pub(super) struct TextFile {
     /// Its path in the data set.
     pub name: PathBuf,
     pub text: String,
+    #[cfg(feature = "digest")]
     pub sha256: [u8; 32],
 }
 
@@ -35,13 +34,20 @@ impl TextFile {
             return Err(fail(DatasetProblem::FileTooLarge { bytes: metadata.len(), limit: MAX_TEXT_BYTES }));
         }
         let bytes = fs::read(path).map_err(unreadable)?;
-        let sha256 = Sha256::digest(&bytes).into();
+        #[cfg(feature = "digest")]
+        let sha256 = <sha2::Sha256 as sha2::Digest>::digest(&bytes).into();
         let text = String::from_utf8(bytes).map_err(|e| {
             let row = line_of(e.as_bytes(), e.utf8_error().valid_up_to());
             DatasetError::new(path, Some(row), DatasetProblem::NotUtf8)
         })?;
         let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
-        Ok(Self { path: path.clone(), name: name.to_path_buf(), text, sha256 })
+        Ok(Self {
+            path: path.clone(),
+            name: name.to_path_buf(),
+            text,
+            #[cfg(feature = "digest")]
+            sha256,
+        })
     }
 }
 

@@ -12,9 +12,11 @@
 //!
 //! Never depends on what is in the files.
 
+#[cfg(feature = "atomic_file")]
 pub mod atomic_file;
 pub mod bounds;
 pub mod budget;
+#[cfg(feature = "digest")]
 pub mod digest;
 pub mod json_text;
 pub mod own_folder;

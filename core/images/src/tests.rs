@@ -1,4 +1,6 @@
-use image::{ImageEncoder as _, Rgb};
+use std::io::Cursor;
+
+use image::{ImageEncoder as _, ImageFormat, Rgb, RgbImage};
 
 use super::*;
 
@@ -25,6 +27,40 @@ fn every_truncation_of_an_image_file_is_an_error() {
             assert!(decode_bytes(&whole[..whole.len() - cut]).is_err(), "{format:?} without its last {cut} bytes");
         }
     }
+}
+
+fn size(bytes: &[u8]) -> Result<(u32, u32), ImageFileError> {
+    header::size(&mut Cursor::new(bytes))
+}
+
+#[test]
+fn the_size_is_known_from_the_header_of_every_format_and_from_no_part_of_it() {
+    for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp, ImageFormat::Tiff] {
+        let whole = encoded(format);
+        assert_eq!(size(&whole).expect("a size"), (64, 48), "{format:?}");
+        let enough = (1..whole.len()).find(|&kept| size(&whole[..kept]).is_ok()).unwrap_or(whole.len());
+        assert!(enough > 20 && size(&whole[..enough]).expect("a size") == (64, 48), "{format:?} needs {enough} bytes");
+    }
+    let mut from_the_top = encoded(ImageFormat::Bmp);
+    from_the_top[22..26].copy_from_slice(&(-48i32).to_le_bytes());
+    assert_eq!(size(&from_the_top).expect("a size"), (64, 48));
+    let mut without_frame = encoded(ImageFormat::Jpeg);
+    let thumbnail = [0xFF, 0xFF, 0xE1, 0x00, 0x0B, 0xFF, 0xD8, 0xFF, 0xC0, 0x00, 0x07, 8, 0];
+    without_frame.splice(2..2, thumbnail);
+    assert_eq!(size(&without_frame).expect("a size"), (64, 48), "of the image and not of its thumbnail");
+    without_frame.splice(2..2, [0xFF, 0xDA]);
+    assert!(matches!(size(&without_frame), Err(ImageFileError::Undecodable(_))));
+}
+
+#[test]
+fn the_size_of_a_big_tiff_of_the_other_order_of_bytes_is_known() {
+    let field = |tag: u16, kind: u16, value: [u8; 8]| {
+        [&tag.to_be_bytes()[..], &kind.to_be_bytes(), &1u64.to_be_bytes(), &value].concat()
+    };
+    let head = [b"MM\0\x2B\0\x08\0\0".as_slice(), &16u64.to_be_bytes(), &2u64.to_be_bytes()].concat();
+    let short = [0x13, 0x88, 0, 0, 0, 0, 0, 0];
+    let bytes = [head, field(256, 3, short), field(257, 16, 4000u64.to_be_bytes())].concat();
+    assert_eq!(size(&bytes).expect("a size"), (5000, 4000));
 }
 
 #[test]

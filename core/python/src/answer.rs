@@ -33,14 +33,15 @@ pub fn calibrate(
     let method = method_by_name(method)?;
     let options = Options { keep_outliers, free_scale, joint_offsets };
     let observations = observations.get();
-    run(py, progress, |work| {
+    let (mut result, sigmas) = run(py, progress, |work| {
         let observed = &observations.observed;
         let wanted = FindingOptions::with_goal_mm(goal_mm);
         let calibration = calibrate_with(observed, method, options, &wanted, work)?;
-        let result = document(observations, &calibration, method, options)?;
-        let sigmas = calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad));
-        Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas))
-    })
+        let result = document(observations, &calibration, method, options);
+        Ok((result, calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad))))
+    })?;
+    result.provenance.input_sha256 = observations.folder.as_ref().map(|folder| folder.input_sha256(py)).transpose()?;
+    Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas))
 }
 
 /// What is wrong with the data: JSON, the page of text, and whether nothing is.
@@ -79,13 +80,12 @@ fn document(
     calibration: &Calibration,
     method: Method,
     options: Options,
-) -> Result<CalibrationResult, Failure> {
-    let sha256 = observations.dataset.as_ref().map(|dataset| dataset.input_sha256().map_err(Failure::input));
+) -> CalibrationResult {
     let mut said = solve_options(method, options, &observations.observed.target);
     if !observations.target_is_known {
         said.insert(TARGET_OPTION.to_owned(), Value::Null);
     }
-    let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), sha256.transpose()?, said);
+    let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), None, said);
     result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
-    Ok(result)
+    result
 }

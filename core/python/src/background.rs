@@ -1,9 +1,9 @@
 //! Work on a thread of its own while Python goes on: its other threads run, Ctrl-C ends the work, progress is told.
 
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use crossbeam_channel::{RecvTimeoutError, unbounded};
 use handeye_geometry::progress::{CancelToken, Progress, Work};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -31,7 +31,7 @@ pub fn run<T: Send>(
     let cancel = CancelToken::default();
     let wants_progress = told.is_some();
     thread::scope(|scope| {
-        let (sender, receiver) = unbounded();
+        let (sender, mut receiver) = channel();
         let token = cancel.clone();
         let worker = scope.spawn(move || {
             // Nobody listens any more only when nobody waits any more.
@@ -45,7 +45,9 @@ pub fn run<T: Send>(
         });
         let mut interrupted = None;
         loop {
-            let said = py.detach(|| receiver.recv_timeout(LOOK));
+            let said;
+            // It may be on one thread at a time only, so that it is handed over and back.
+            (said, receiver) = py.detach(move || (receiver.recv_timeout(LOOK), receiver));
             let heard = match said {
                 Ok(Said::Done(result)) => return interrupted.map_or(result, |error: PyErr| Err(error.into())),
                 Ok(Said::Progress(now)) => {

@@ -1,5 +1,6 @@
 //! Dataset folders as arrays.
 
+use std::fs;
 use std::path::PathBuf;
 
 use handeye_dataset::{Dataset, Entry};
@@ -14,11 +15,45 @@ use crate::numbers::{bytes_of, of_pose};
 /// Numbers (int64) and pixels of the corners of a view.
 type CornerBytes<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 
+/// A dataset folder that was read.
+pub struct Folder {
+    dataset: Dataset,
+    /// What `sha256sum` prints of its text files, which may change until there is a result.
+    listing: String,
+}
+
+impl Folder {
+    /// `handeye_dataset::Dataset::input_sha256`, by the SHA-256 of Python.
+    pub fn input_sha256(&self, py: Python<'_>) -> Result<String, Failure> {
+        let mut listing = self.listing.clone();
+        for entry in &self.dataset.entries {
+            if let Some(name) = self.dataset.image_name(entry) {
+                listing += &sha256_line(py, &name, &self.dataset.image_bytes(entry).map_err(Failure::input)?)?;
+            }
+        }
+        sha256(py, listing.as_bytes())
+    }
+}
+
+fn sha256_line(py: Python<'_>, name: &str, bytes: &[u8]) -> Result<String, Failure> {
+    Ok(format!("{}  {name}\n", sha256(py, bytes)?))
+}
+
+fn sha256(py: Python<'_>, bytes: &[u8]) -> Result<String, Failure> {
+    let hash = py.import("hashlib")?.call_method1("sha256", (PyBytes::new(py, bytes),))?;
+    Ok(hash.call_method0("hexdigest")?.extract()?)
+}
+
 /// A dataset folder: what a calibration is made from, what is small as JSON, and arrays by their names. An array that no
 /// view has is left out; a pose that one view lacks is not finite.
 #[pyfunction]
 pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, String, Bound<'_, PyDict>), Failure> {
     let dataset = py.detach(|| Dataset::read(&folder)).map_err(Failure::input)?;
+    let mut listing = String::new();
+    for (name, path) in dataset.text_files() {
+        let bytes = fs::read(&path).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+        listing += &sha256_line(py, name, &bytes)?;
+    }
     let entries = &dataset.entries;
     let arrays = PyDict::new(py);
     if entries.iter().any(|entry| entry.base_from_tip.is_some()) {
@@ -47,7 +82,8 @@ pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, Str
         "notes": dataset.outside,
     });
     let observed = dataset.observations(|_image| None);
-    Ok((Observations { observed, dataset: Some(dataset), target_is_known: true }, described.to_string(), arrays))
+    let folder = Some(Folder { dataset, listing });
+    Ok((Observations { observed, folder, target_is_known: true }, described.to_string(), arrays))
 }
 
 fn matrix(pose: Option<Vec<f64>>) -> Vec<f64> {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use handeye_dataset::Dataset;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Observations as Observed, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
@@ -15,6 +14,7 @@ use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Failure;
+use crate::folder::Folder;
 use crate::numbers::{bytes_of, doubles, integers, poses};
 
 /// How far beside the image a corner may be, pixels, as in a corner table.
@@ -82,7 +82,7 @@ fn model(name: &str) -> Result<Distortion, Failure> {
 pub struct Observations {
     pub observed: Observed,
     /// The folder that it is from.
-    pub dataset: Option<Dataset>,
+    pub folder: Option<Folder>,
     /// Whether the target was stated.
     pub target_is_known: bool,
 }
@@ -140,7 +140,7 @@ impl Observations {
         }
         let image_size = image_size.unwrap_or_default();
         let observed = Observed { mode, target: spec, image_size, camera, views };
-        Ok(Self { observed, dataset: None, target_is_known: target.is_some() })
+        Ok(Self { observed, folder: None, target_is_known: target.is_some() })
     }
 }
 

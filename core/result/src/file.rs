@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::{BadResult, CalibrationResult, FORMAT, VERSION};
-use handeye_files::{atomic_file, json_text};
+use handeye_files::json_text;
 use handeye_wording::one_line;
 
 /// Why a result file could not be read or written.
@@ -102,10 +102,12 @@ impl CalibrationResult {
     ///
     /// # Errors
     /// [`ResultError`]; what was there before is then still there.
+    #[cfg(feature = "writing")]
     pub fn write(&self, file: &Path) -> Result<(), ResultError> {
         self.to_json()
             .and_then(|text| {
-                atomic_file::write(file, text.as_bytes()).map_err(|e| ResultProblem::Unwritable(one_line(&e)))
+                handeye_files::atomic_file::write(file, text.as_bytes())
+                    .map_err(|e| ResultProblem::Unwritable(one_line(&e)))
             })
             .map_err(|problem| ResultError { file: file.to_path_buf(), problem })
     }

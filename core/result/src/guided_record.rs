@@ -1,11 +1,6 @@
 //! A guided session as it is kept, so that it can be studied afterwards.
 
-use std::io;
-use std::path::Path;
-
 use serde::{Deserialize, Serialize};
-
-use handeye_files::{atomic_file, json_text};
 
 /// Name of the record in a session.
 pub const GUIDED_RECORD: &str = "guided.json";
@@ -61,12 +56,13 @@ pub struct EndingRecord {
     pub text: String,
 }
 
+#[cfg(feature = "writing")]
 impl GuidedRecord {
     /// Writes it as JSON, as a whole or not at all.
     ///
     /// # Errors
     /// That of the file.
-    pub fn write(&self, path: &Path) -> io::Result<()> {
-        atomic_file::write(path, json_text::pretty(self)?.as_bytes())
+    pub fn write(&self, path: &std::path::Path) -> std::io::Result<()> {
+        handeye_files::atomic_file::write(path, handeye_files::json_text::pretty(self)?.as_bytes())
     }
 }
