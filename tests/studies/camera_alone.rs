@@ -3,7 +3,7 @@
 //!
 //!     cargo run --release -p handeye_studies --example camera_alone -- TRIALS [flat]
 //!
-//! Prints Markdown: the tables of `docs/maths/camera_alone.md`. Every cell runs so many sessions through `calibrate`:
+//! Prints Markdown: the tables of `docs/studies/mathematics.md`. Every cell runs so many sessions through `calibrate`:
 //! 640×480, f = 581 px, five distortion coefficients, 10×7 corners of 30 mm, 0.5 to 0.8 m away, tilted by 11° to 40°, 0.1 px
 //! per axis; `little tilt` is 3° to 17°. With `flat` only flat boards, for the rate of false alarms.
 

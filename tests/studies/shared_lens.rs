@@ -67,8 +67,7 @@ fn session(lens: Lens, views: usize, is_last: bool, seed: u64) -> (Session, Obse
     if lens == Lens::Waves {
         trial.add_waves(WAVE_PX, WAVE_LENGTH_PX);
     }
-    let free = CameraKnowledge::Estimate { model: Distortion::BrownConrady([0.0; 5]), start: None };
-    let observations = Observations { camera: free, ..trial.observations(true) };
+    let observations = Observations { camera: CameraKnowledge::NOTHING, ..trial.observations(true) };
     (trial, observations)
 }
 

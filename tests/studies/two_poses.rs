@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release -p handeye_studies --example two_poses -- SESSIONS
 //!
-//! Prints Markdown: the table of `docs/maths/two_poses.md`. A session has 15 views of 4×3 corners, 15 mm apart, through
+//! Prints Markdown: the table of `docs/studies/mathematics.md`. A session has 15 views of 4×3 corners, 15 mm apart, through
 //! 640×480 pixels with f = 581 px, 0.2 px of noise per axis, rolled by up to 60°, by a robot that repeats to 0.1 mm and
 //! 0.02°. Targets are 0.5 m to the stated distance away and tilted by up to the stated angle.
 
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use handeye_estimate::diagnose::calibrate;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::Noise;
-use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
+use handeye_estimate::{Method, ViewStatus};
 use handeye_geometry::planar_pose;
 use handeye_geometry::progress::CancelToken;
 use handeye_simulate::session::{REALISTIC, SMALL_TARGET, SmallTarget, camera, small_target_trial};
@@ -49,13 +49,7 @@ fn session(case: SmallTarget, mode: Mode, seed: u64) -> Session {
             pose.alternative.is_some_and(|other| off(&other) < off(&pose.best))
         })
     };
-    let observations = Observations {
-        mode: Some(mode),
-        target: SMALL_TARGET,
-        image_size: (640, 480),
-        camera: CameraKnowledge::Fixed(camera()),
-        views: trial.views.iter().map(ObservedView::from).collect(),
-    };
+    let observations = trial.observations(false);
     let mut out = Session {
         wrong_poses: (0..VIEWS).filter(wrong).count(),
         error_mm: [f64::INFINITY; METHODS.len() + 1],

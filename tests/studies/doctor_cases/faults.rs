@@ -1,4 +1,4 @@
-//! The six faults that have to be ranked first, and healthy sessions.
+//! The nine faults that have to be ranked first, and healthy sessions.
 
 use handeye_estimate::diagnose::calibrate;
 use handeye_estimate::diagnose::doctor::{Diagnosis, diagnose};
