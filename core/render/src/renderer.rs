@@ -57,6 +57,11 @@ impl Renderer {
         self.finish_rgb(self.trace(scene, imaging, true), imaging, seed)
     }
 
+    /// The light of every pixel as it is before the sensor: red, green and blue, neither blurred nor rounded.
+    pub fn render_light(&self, scene: &RenderScene) -> Vec<f32> {
+        self.trace(scene, &Imaging::default(), true).colours
+    }
+
     /// As [`Self::render_rgb`], with the depths of a sensor without noise, which cost nothing more; see [`Self::sense_depth`].
     pub fn render_rgb_with_ideal_depth(
         &self,

@@ -1,6 +1,6 @@
 //! Sessions and images of which the truth is known, for tests, studies and benchmarks. No shipped program has it.
 //!
-//! Where lenses, links, arms and sheets put things is written out here: from `handeye_geometry` and `handeye_arm` come types and the
+//! Where lenses, links and arms put things is written out here: from `handeye_geometry` and `handeye_arm` come types and the
 //! numbers of data sheets alone, so that an estimator is not judged by its own formulas.
 //!
 //! | module | sessions |
@@ -11,9 +11,12 @@
 //!
 //! | module | images |
 //! | --- | --- |
-//! | [`Scene`] | any target, as it is printed, through a lens: the exact area of every pixel |
-//! | [`flat_board`] | a chessboard seen straight on, with a blur that is known |
+//! | [`Scene`] | any target, as it is printed, through a lens |
 //! | [`moving_board`] | a chessboard that moves, with depths |
+//! | [`flat_board`] | a chessboard seen straight on, whose blur, by a motion too, is a Gaussian and known |
+//!
+//! Chessboards are drawn by `handeye_render`, but for `flat_board`: it knows neither motion nor a pixel without an area, and neither
+//! marks nor dots.
 //!
 //! ```
 //! use handeye_geometry::camera::Intrinsics;
@@ -30,7 +33,6 @@ mod arm;
 mod board_views;
 #[cfg(feature = "print")]
 mod drawn;
-mod exact;
 pub mod flat_board;
 pub mod lens;
 pub mod links;

@@ -1,21 +1,21 @@
 //! Images of targets through a camera with known corners.
 
 use image::{GrayImage, Luma};
-use nalgebra::{Isometry3, Vector2};
+use nalgebra::{Isometry3, Unit, Vector2, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Normal};
 
 #[cfg(feature = "print")]
 use super::drawn::Drawn;
-use super::exact::Squares;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_geometry::testing::looking_at;
+use handeye_render::{BoardSurface, Light, LightSource, RenderScene, Renderer};
 
 /// An image to be taken of a target.
 ///
-/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper without end. Any target by `Scene::drawn` (feature `print`)
+/// A chessboard by [`Scene::new`] has the exact area of every pixel, on paper that has no end in the image. Any target by `Scene::drawn` (feature `print`)
 /// is the drawing that is printed, sampled ten by ten in pixels that an outline crosses, on its paper on a table.
 pub struct Scene {
     /// The camera, with its lens.
@@ -42,6 +42,10 @@ pub struct Scene {
     drawn: Option<Drawn>,
 }
 
+/// Nothing is nearer or farther, and no paper ends within this, metres: chessboards are of 15 mm or of 1 m.
+const NEAR_M: f64 = 1e-3;
+const FAR_M: f64 = 1e6;
+const PAPER_M: f64 = 1e5;
 /// Grey level of what is around the paper and in front of it.
 const TABLE: f64 = 120.0;
 
@@ -119,13 +123,28 @@ impl Scene {
         if let Some(drawn) = &self.drawn {
             return drawn.levels(self, TABLE);
         }
-        Squares::of(self).levels(self)
+        let light = Renderer::new(self.camera, NEAR_M, FAR_M).render_light(&self.print());
+        light.chunks_exact(3).map(|rgb| 255.0 * f64::from(rgb[0])).collect()
+    }
+
+    fn print(&self) -> RenderScene {
+        let grid = self.grid();
+        let [dark, light] = [self.dark, self.light].map(|level| (level / 255.0) as f32);
+        let board = BoardSurface::new(self.camera_from_target, grid.columns, grid.rows, grid.square_m, [PAPER_M; 2]);
+        let board = if self.first_dark {
+            BoardSurface { dark, white: light, ..board }
+        } else {
+            // Ink and paper changed over, and cut out along the print.
+            let side = |corners: usize| (corners + 1) as f64 * grid.square_m;
+            BoardSurface { dark: light, white: dark, paper_m: [side(grid.columns), side(grid.rows)], ..board }
+        };
+        lit(board, light)
     }
 
     /// The image with the noise that comes next.
     ///
     /// # Panics
-    /// When the target is seen edge-on, or the lens model does not reach the edge of an exact image.
+    /// When the noise is not a deviation.
     pub fn render_with(&self, rng: &mut ChaCha8Rng) -> GrayImage {
         let (width, height) = (self.camera.width as usize, self.camera.height as usize);
         let mut levels = self.levels();
@@ -146,6 +165,14 @@ impl Scene {
             Luma([level.round().clamp(0.0, 255.0) as u8])
         })
     }
+}
+
+/// A chessboard before the camera and what is around it, each as bright as it is coloured.
+pub(super) fn lit(board: BoardSurface, around: f32) -> RenderScene {
+    // From where the lamp is, the board is seen straight on.
+    let towards_lamp = Unit::new_normalize(board.world_from_target.rotation * -Vector3::z());
+    let light = Light { source: LightSource::Directional(towards_lamp), ambient: 1.0, diffuse: 0.0 };
+    RenderScene { world_from_camera: Isometry3::identity(), board, solids: Vec::new(), light, background: [around; 3] }
 }
 
 fn blur(levels: &mut [f64], width: usize, height: usize, sigma: f64) {
