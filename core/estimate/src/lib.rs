@@ -70,7 +70,7 @@
 //! | [`intrinsics`] | the lens from views of a target, without a robot |
 //! | [`handeye`] | closed forms, and the joint estimate of camera, target, lens, robot noise and what else the images show |
 //! | [`uncertainty`] | covariance, overdispersion, expected error of a point |
-//! | [`diagnose`] | findings, the doctor, the calibration that states its error |
+//! | [`diagnose`] | hypotheses about conventions and pairing, findings, the doctor, the calibration that states its error |
 //! | [`verify`] | predictions for views outside the fit, depth cameras |
 //! | [`clock_offset`], [`resolution`], [`shared_lens`], [`placement`] | clocks of camera and robot, resolution of poses, several cameras of a kind, an arm by its joint values |
 //!

@@ -4,15 +4,15 @@ use nalgebra::Isometry3;
 
 use super::conventions::{Direction, Reading};
 use super::formats::tree::LEAST_POSES;
-use super::judge::{EXPLAINED, EXPLAINED_RAD};
 use super::pairing::Pairing;
 use super::recording::{Recording, Sample};
+use handeye_estimate::diagnose::hypotheses::{EXPLAINED, EXPLAINED_RAD};
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_wording::Text;
 
 /// What the poses of the target come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Source {
     /// The images of a stream, by its place in [`Recording::streams`].
     Stream(usize),

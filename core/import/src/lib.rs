@@ -57,8 +57,9 @@ pub use chain::with_arm;
 pub use conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm};
 pub use error::ImportError;
 pub use formats::formats;
+pub use handeye_estimate::diagnose::hypotheses::Verdict;
 pub use hypothesis::{Convention, Fit, Hypothesis, Source};
-pub use judge::{Judgement, NEED, Sights, TIMES, Verdict, judge};
+pub use judge::{Judgement, Sights, judge};
 pub use pairing::Pairing;
 pub use recognise::{open, open_within};
 pub use recording::{

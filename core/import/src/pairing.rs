@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::folder;
 use super::recording::{ImageFile, Sample};
-use handeye_geometry::natural_order;
+use handeye_estimate::diagnose::hypotheses::pairing::{Order, along};
 
 /// A rule, and what it says.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ impl Pairing {
         self.image_of.iter().flatten().count()
     }
 
-    /// Other rules in whose words it is found, and images that no pose has.
+    /// Images that no pose has.
     pub fn without_pose(&self, images: usize) -> Vec<usize> {
         (0..images).filter(|image| !self.image_of.contains(&Some(*image))).collect()
     }
@@ -162,74 +162,29 @@ fn by_number(samples: &[Sample], images: &[ImageFile]) -> Vec<Pairing> {
 
 fn by_order(samples: &[Sample], images: &[ImageFile]) -> Vec<Pairing> {
     let (poses, count) = (samples.len(), images.len());
-    let sorted = |compare: &dyn Fn(&str, &str) -> std::cmp::Ordering| -> Vec<usize> {
-        let names: Vec<String> = images.iter().map(ImageFile::shown).collect();
-        let mut order: Vec<usize> = (0..count).collect();
-        order.sort_by(|a, b| compare(&names[*a], &names[*b]));
-        order
-    };
-    let natural = sorted(&natural_order::compare);
-    let letters = sorted(&|a, b| a.cmp(b));
-    let along = |order: &[usize], skip_images: usize, skip_poses: usize| -> Vec<Option<usize>> {
-        (0..poses).map(|pose| order.get(pose.checked_sub(skip_poses)? + skip_images).copied()).collect()
-    };
-    let mut out = vec![Pairing::new("order", "in order, images counted as people count", along(&natural, 0, 0))];
-    if count > poses {
-        out.push(Pairing::new("order_from_end", "in order from the last one back", along(&natural, count - poses, 0)));
-    } else if poses > count {
-        out.push(Pairing::new("order_from_end", "in order from the last one back", along(&natural, 0, poses - count)));
+    let names: Vec<String> = images.iter().map(ImageFile::shown).collect();
+    let (natural, letters) = (Order::ByNumber.sorted(&names), Order::ByLetters.sorted(&names));
+    let in_order = |order: &[usize], further: isize| (0..poses).map(|pose| along(order, pose, further)).collect();
+    let mut out = vec![Pairing::new("order", "in order, images counted as people count", in_order(&natural, 0))];
+    if count != poses {
+        let from_end = in_order(&natural, count as isize - poses as isize);
+        out.push(Pairing::new("order_from_end", "in order from the last one back", from_end));
     }
     if letters != natural {
-        out.push(Pairing::new("letters", "in order, images sorted letter by letter (1, 10, 2)", along(&letters, 0, 0)));
+        let by_letters = in_order(&letters, 0);
+        out.push(Pairing::new("letters", "in order, images sorted letter by letter (1, 10, 2)", by_letters));
         // The table was written in that order while the images were not.
         if poses == count {
-            let mut image_of = vec![None; poses];
-            for (rank, image) in letters.iter().enumerate() {
-                if let Some(slot) = natural.iter().position(|i| i == image).and_then(|row| image_of.get_mut(row)) {
-                    *slot = natural.get(rank).copied();
-                }
-            }
+            let ranks = Order::ByLetters.ranks(&names);
+            let image_of = natural.iter().map(|image| natural.get(ranks[*image]).copied()).collect();
             out.push(Pairing::new("letters_of_rows", "in order, rows sorted letter by letter (1, 10, 2)", image_of));
         }
     }
     out
 }
 
-/// The pairing in order that a cost of every image at every pose speaks for: poses and images may be left out on either side.
-/// `None` where nothing is cheaper than leaving out.
-pub(super) fn aligned(poses: usize, images: usize, leave_out: f64, cost: impl Fn(usize, usize) -> f64) -> Pairing {
-    // The least cost of the first so many of both.
-    let mut best = vec![vec![0.0f64; images + 1]; poses + 1];
-    for p in 0..=poses {
-        for i in 0..=images {
-            if p == 0 && i == 0 {
-                continue;
-            }
-            let mut least = f64::INFINITY;
-            if p > 0 {
-                least = least.min(best[p - 1][i] + leave_out);
-            }
-            if i > 0 {
-                least = least.min(best[p][i - 1] + leave_out);
-            }
-            if p > 0 && i > 0 {
-                least = least.min(best[p - 1][i - 1] + cost(p - 1, i - 1));
-            }
-            best[p][i] = least;
-        }
-    }
-    let mut image_of = vec![None; poses];
-    let (mut p, mut i) = (poses, images);
-    while p > 0 && i > 0 {
-        if best[p][i] == best[p - 1][i - 1] + cost(p - 1, i - 1) {
-            image_of[p - 1] = Some(i - 1);
-            (p, i) = (p - 1, i - 1);
-        } else if best[p][i] == best[p - 1][i] + leave_out {
-            p -= 1;
-        } else {
-            i -= 1;
-        }
-    }
+/// The pairing in order with gaps that was found by what fits.
+pub(super) fn by_content(image_of: Vec<Option<usize>>) -> Pairing {
     let text = "in order, with gaps where the images show them";
     Pairing { is_by_content: true, ..Pairing::new("aligned", text, image_of) }
 }
@@ -303,13 +258,5 @@ mod tests {
         samples[2].numbers = samples[0].numbers;
         let all = pairings(&samples, &images(&["a.png", "b.png", "c.png"]), 2);
         assert_eq!(of(&all, "name"), [Some(0), Some(1), None, Some(2)], "the same pose twice");
-    }
-
-    #[test]
-    fn gaps_on_both_sides_are_found_by_what_fits() {
-        // Pose 2 has no image, image 4 no pose.
-        let truth = [Some(0), Some(1), None, Some(2), Some(3), Some(5)];
-        let cost = |pose: usize, image: usize| if truth[pose] == Some(image) { 0.01 } else { 10.0 };
-        assert_eq!(aligned(6, 6, 1.0, cost).image_of, truth);
     }
 }

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix4};
+use nalgebra::Isometry3;
 use tempfile::TempDir;
 
+pub use super::conventions::Numbers;
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use handeye_estimate::clock_offset::ClockOffset;
 use handeye_estimate::handeye::Mode;
@@ -286,17 +287,6 @@ pub struct JointSample {
     pub place: Arc<Text>,
     /// The values.
     pub values: Vec<f64>,
-}
-
-/// The numbers of a pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Numbers {
-    /// x y z and three numbers of a rotation.
-    Angles([f64; 6]),
-    /// x y z and a quaternion of unit length.
-    Quaternion([f64; 7]),
-    /// A rigid transform.
-    Matrix(Matrix4<f64>),
 }
 
 /// What a file says of the conventions of a series, and how it is known. `None`: not stated.

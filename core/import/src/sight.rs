@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Matrix6, Point3};
 use super::formats::corners;
 use super::recording::Stream;
 use handeye_estimate::diagnose::doctor::views::SessionViews;
+use handeye_estimate::diagnose::hypotheses::SeenTarget;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::numbering::Turns;
 use handeye_estimate::{CameraKnowledge, Observations, ObservedView};
@@ -23,12 +24,8 @@ pub struct Sight {
     pub seen: Vec<Option<Isometry3<f64>>>,
     /// Covariance of each by the noise of the corners, right perturbation; empty for poses that were recorded.
     pub(super) covariances: Vec<Option<Matrix6<f64>>>,
-    /// Four outer points of the target, where misfits are measured.
-    pub(super) outer: [Point3<f64>; 4],
-    /// By which the target looks the same.
-    pub(super) turns: Turns,
-    /// Median distance of the target from the camera, metres.
-    pub distance_m: f64,
+    /// The target as the camera sees it.
+    pub target: SeenTarget,
     /// The camera that the poses were found with.
     pub intrinsics: Option<Intrinsics>,
 }
@@ -58,15 +55,8 @@ impl Sight {
                 (*slot, *covariance) = (Some(view.camera_from_target), Some(view.covariance));
             }
         }
-        let turns = Turns::of(&target);
-        Ok(Self {
-            seen,
-            covariances,
-            outer: views.outer,
-            turns,
-            distance_m: views.distance_m,
-            intrinsics: views.intrinsics,
-        })
+        let target = SeenTarget { turns: Turns::of(&target), ..views.target };
+        Ok(Self { seen, covariances, target, intrinsics: views.intrinsics })
     }
 
     /// From points that another program has found; the size of the images is said by the files or by a person.
@@ -105,7 +95,8 @@ impl Sight {
         };
         let distances = seen.iter().flatten().map(|pose| pose.translation.vector.norm());
         let distance_m = median(distances).unwrap_or(0.0);
-        Self { seen, covariances: Vec::new(), outer, turns: Turns::default(), distance_m, intrinsics: None }
+        let target = SeenTarget { outer, turns: Turns::default(), distance_m };
+        Self { seen, covariances: Vec::new(), target, intrinsics: None }
     }
 }
 

@@ -9,12 +9,13 @@ use nalgebra::Isometry3;
 use super::conventions::{Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
 use super::formats::tree;
-use super::judge::{Sights, TIMES};
+use super::judge::Sights;
 use super::recording::{Clocks, ImageFile, Known, Motion, Numbers, Recording, Role, Sample, Stated, Stream, Track};
 use super::settings::Settings;
 use super::sight::Sight;
 use handeye_estimate::clock_offset::{ClockOffset, ClockOffsetError, clock_offset, pose_at};
-use handeye_estimate::diagnose::doctor::agreement::agreement;
+use handeye_estimate::diagnose::hypotheses::agreement::agreement;
+use handeye_estimate::diagnose::hypotheses::rules_out;
 use handeye_estimate::handeye::{Mode, PosePair, subset};
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::progress::CancelToken;
@@ -75,7 +76,8 @@ pub fn timed(
             continue;
         };
         is_timed = true;
-        let chosen = slowest(&seen, &anchor_from_mount(motion, Direction::Forward, first_ns), offset, sight.distance_m);
+        let chosen =
+            slowest(&seen, &anchor_from_mount(motion, Direction::Forward, first_ns), offset, sight.target.distance_m);
         for (motion, offset) in &found {
             out.tracks.extend(track(motion, stream, offset, &chosen, first_ns));
             let (images, poses) = (stream.name.clone(), motion.name.clone());
@@ -169,7 +171,7 @@ fn told(
                 let pairs: Vec<PosePair> = camera.iter().filter_map(pair).collect();
                 let pairs: Vec<PosePair> =
                     subset::spread(pairs.len(), MOST_COMPARED).into_iter().map(|i| pairs[i]).collect();
-                let left = agreement(&sight.outer, &pairs, true).map_or(f64::INFINITY, |found| found.median_m);
+                let left = agreement(&sight.target.outer, &pairs, true).map_or(f64::INFINITY, |found| found.median_m);
                 told.push((left, ClockOffset { offset_s: offset.offset_s + about_s, ..offset }));
             }
         }
@@ -179,7 +181,7 @@ fn told(
         ([(_, best)], _) => Ok(*best),
         ([(left, best), (other_left, other)], _) => {
             let apart_s = (best.offset_s - other.offset_s).abs();
-            if TIMES * left < *other_left || apart_s <= best.sigma_s.max(other.sigma_s) {
+            if rules_out(*left, *other_left) || apart_s <= best.sigma_s.max(other.sigma_s) {
                 Ok(*best)
             } else {
                 Err(ClockOffsetError::Ambiguous { first_s: best.offset_s, second_s: other.offset_s })
@@ -193,11 +195,9 @@ fn told(
 /// The inverse of what was recorded is what the mount does where the camera stands beside the robot.
 fn classes(motion: &Motion, settings: &Settings) -> Vec<Direction> {
     let direction = settings.direction.or(motion.direction.as_ref().map(|known| known.value));
-    let other = |direction: Direction| Direction::ALL.into_iter().filter(move |d| *d != direction);
-    match (settings.mode, direction) {
-        (Some(Mode::EyeInHand), Some(direction)) => vec![direction],
-        (Some(Mode::EyeToHand), Some(direction)) => other(direction).collect(),
-        _ => Direction::ALL.to_vec(),
+    match settings.mode.zip(direction) {
+        Some((mode, direction)) => vec![direction.of_mount(mode)],
+        None => Direction::ALL.to_vec(),
     }
 }
 

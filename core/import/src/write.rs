@@ -10,7 +10,7 @@ use super::conventions::AngleUnit;
 use super::error::ImportError;
 use super::folder::unreadable;
 use super::hypothesis::{Hypothesis, Source};
-use super::judge::{Judgement, TIMES};
+use super::judge::Judgement;
 use super::recording::{FoundCamera, ImageFile, Recording, Stream, Track};
 use super::settings::Settings;
 use super::sight::{recorded_corners, size_of_points};
@@ -18,6 +18,7 @@ use handeye_dataset::CameraInput;
 use handeye_dataset::write::{
     Joints, POSE_TABLE, description, description_of_images, pose_table, pose_table_with_joints,
 };
+use handeye_estimate::diagnose::hypotheses::rules_out;
 use handeye_files::atomic_file;
 use handeye_files::own_folder::{self, DESCRIPTION};
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -393,7 +394,7 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     });
     match other.min_by(|a, b| a.0.total_cmp(&b.0)) {
         None => "nothing else is possible with these files, or explains the views nearly as well".into(),
-        Some((relative, said, value, _)) if relative > TIMES * own => {
+        Some((relative, said, value, _)) if rules_out(own, relative) => {
             format!("by the data: it leaves {own_said}, {value} leaves {said}")
         }
         Some((.., value, Some(why))) => format!("by the data: {value} is contradicted: {why}"),

@@ -40,26 +40,21 @@ pub(super) struct Case {
     /// The places of the camera and the directions that mean it.
     pub labels: Vec<(Mode, Direction)>,
     /// By how much the angles of robot and target differ.
-    pub apart_rad: f64,
+    pub unlike_rad: f64,
 }
 
 impl Case {
     /// The case of a hypothesis, without its pairing.
     pub fn of(h: &Hypothesis) -> Self {
-        let class = match (h.mode, h.direction) {
-            (Mode::EyeInHand, direction) => direction,
-            (Mode::EyeToHand, Direction::Forward) => Direction::Inverse,
-            (Mode::EyeToHand, Direction::Inverse) => Direction::Forward,
-        };
         Self {
             source: h.source,
             robot: h.robot,
             pairing: 0,
             reading: h.reading,
             target_reading: h.target_reading,
-            class,
+            class: h.direction.of_mount(h.mode),
             labels: Vec::new(),
-            apart_rad: f64::INFINITY,
+            unlike_rad: f64::INFINITY,
         }
     }
 }
@@ -370,7 +365,7 @@ pub(super) fn cases(recording: &Recording, paired: &[Paired], settings: &Setting
                         target_reading: *target_reading,
                         class,
                         labels: labels.clone(),
-                        apart_rad: f64::INFINITY,
+                        unlike_rad: f64::INFINITY,
                     });
                 }
             }
@@ -409,10 +404,6 @@ fn target_readings(track: &Track, settings: &Settings) -> Vec<(Reading, Directio
 
 /// The places of the camera and the directions that give these equations and that nothing rules out.
 fn labels(recording: &Recording, track: &Track, class: Direction, settings: &Settings) -> Vec<(Mode, Direction)> {
-    let other = match class {
-        Direction::Forward => Direction::Inverse,
-        Direction::Inverse => Direction::Forward,
-    };
     let mode = settings.mode.or(recording.mode.as_ref().map(|known| known.value));
     let allowed = |(place, direction): &(Mode, Direction)| {
         let by_mode = mode.is_none_or(|mode| mode == *place);
@@ -424,5 +415,5 @@ fn labels(recording: &Recording, track: &Track, class: Direction, settings: &Set
         };
         by_mode && by_direction
     };
-    [(Mode::EyeInHand, class), (Mode::EyeToHand, other)].into_iter().filter(allowed).collect()
+    [Mode::EyeInHand, Mode::EyeToHand].map(|mode| (mode, class.of_mount(mode))).into_iter().filter(allowed).collect()
 }

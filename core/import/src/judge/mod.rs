@@ -1,8 +1,5 @@
-//! The hypotheses about a recording, tried against what the camera saw.
-//!
-//! Under each of them closed forms are solved, and the distance between where the chain puts the target and where it was seen
-//! is measured on the camera's side in metres, so that it means the same under all of them: as the [doctor](handeye_estimate::diagnose::doctor)
-//! does with gross faults.
+//! What files and settings leave open of a recording, as cases for the engine of
+//! [`hypotheses`](handeye_estimate::diagnose::hypotheses), and what speaks against those that explain the views.
 //!
 //! Poses that map the other way with the camera in the other place give the same equations, so no data tell them apart. Both
 //! are listed; the one that puts the camera nearer to what carries it than the target is comes first.
@@ -15,31 +12,23 @@ mod trial;
 mod turns;
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
 use super::error::ImportError;
 use super::formats::tree::LEAST_POSES;
 use super::hypothesis::{Hypothesis, Source};
-use super::recording::Recording;
+use super::recording::{Recording, Sample};
 use super::settings::Settings;
 use super::sight::Sight;
+use handeye_estimate::diagnose::hypotheses::{self, Score, Search, Verdict, ranked, sort_by_misfit};
 use handeye_estimate::handeye::Mode;
-use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
-use handeye_geometry::progress::CancelToken;
+use handeye_geometry::frames::{Base, Camera, Frame, Pose, Target, Tip};
+use handeye_geometry::progress::{CancelToken, Work};
 use handeye_geometry::targets::TargetSpec;
 use trial::Judge;
 
-/// A hypothesis that explains the views leaves less than this part of the target's distance.
-pub(crate) const EXPLAINED: f64 = 0.05;
-/// And at the median a smaller angle \[rad\] than this: the same part of a turn by one radian.
-pub(crate) const EXPLAINED_RAD: f64 = 0.05;
-/// And another one is ruled out when it leaves so many times more.
-pub const TIMES: f64 = 3.0;
-/// Views with which hypotheses can be told apart: with three any of them fits.
-pub const NEED: usize = 4;
-/// A hypothesis that leaves less than this part of the target's distance needs no second look at the others.
-const CLEAR: f64 = 0.01;
 /// Views that are looked at to sort hypotheses.
 const MOST_QUICK: usize = 20;
 /// Hypotheses whose equations are solved, and of those the ones that may leave views out, which takes some ten times as long.
@@ -98,17 +87,6 @@ impl Judgement {
     }
 }
 
-/// What follows from the hypotheses.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Verdict {
-    /// The first is the only one that explains the views.
-    Decided,
-    /// The first so many explain them about as well: a person has to say which it is.
-    Ambiguous(usize),
-    /// None explains them.
-    Unexplained,
-}
-
 /// Tries every hypothesis that the files and the settings leave open.
 ///
 /// # Errors
@@ -129,43 +107,24 @@ pub fn judge(
     let judge = Judge { recording, sights, paired: &paired, settings, cancel, read, own };
     let tried = cases.len();
     untried += turns::keep_alike(&judge, &mut cases, MOST_SOLVED);
-    let mut quick: Vec<(f64, usize)> = Vec::with_capacity(tried);
-    for robust in [false, true] {
-        // A pairing of which a part is wrong spoils a plain solution: then each hypothesis is given the chance to leave
-        // views out, those first in which robot and target turn alike, which wrong views do not spoil.
-        let mut chosen: Vec<usize> = (0..cases.len()).collect();
-        if robust && chosen.len() > MOST_ROBUST {
-            chosen.sort_by(|a, b| cases[*a].apart_rad.total_cmp(&cases[*b].apart_rad));
-            chosen.truncate(MOST_ROBUST);
-            let again: BTreeSet<usize> = chosen.iter().copied().collect();
-            quick.retain(|(_, i)| !again.contains(i));
-        } else {
-            quick.clear();
-        }
-        for i in chosen {
-            let case = &cases[i];
-            if cancel.is_cancelled() {
-                break;
-            }
-            let fit = judge.solve(case, MOST_QUICK, robust).map(|(_, median_m)| median_m / judge.distance_of(case));
-            quick.push((fit.unwrap_or(f64::INFINITY), i));
-        }
-        quick.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let best = quick.first().map_or(f64::INFINITY, |(fit, _)| *fit);
-        if best < CLEAR {
-            break;
-        }
-    }
-    let mut chosen: Vec<usize> = quick.iter().take(MOST_JUDGED).map(|(_, i)| *i).collect();
+    let search = Search {
+        most_views: MOST_QUICK,
+        most_robust: MOST_ROBUST,
+        unlike_rad: &|index| cases[index].unlike_rad,
+        as_stated: None,
+    };
+    let trial = |index: usize| judge.trial(&cases[index], judge.pairing_of(&cases[index]));
+    let quick = ranked(cases.len(), trial, &search, &Work::from(cancel));
+    let mut chosen: Vec<usize> = quick.iter().take(MOST_JUDGED).map(|it| it.index).collect();
     // The best of every pairing is worth a look, whatever else is better.
     for number in 0..paired.len() {
         if chosen.len() >= 2 * MOST_JUDGED {
             break;
         }
-        if let Some((_, i)) = quick.iter().find(|(_, i)| cases[*i].pairing == number)
-            && !chosen.contains(i)
+        if let Some(it) = quick.iter().find(|it| cases[it.index].pairing == number)
+            && !chosen.contains(&it.index)
         {
-            chosen.push(*i);
+            chosen.push(it.index);
         }
     }
     let mut hypotheses: Vec<Hypothesis> = chosen.iter().flat_map(|i| judge.judged(&cases[*i])).collect();
@@ -185,26 +144,29 @@ pub fn judge(
     sort(recording, &mut hypotheses);
     hypotheses.truncate(MOST_LISTED);
     let distance_m = hypotheses.first().map_or(0.0, |h| judge.sight_distance(h));
-    let verdict = verdict(&mut hypotheses);
+    let verdict = verdict_on(&mut hypotheses);
     Ok(Judgement { hypotheses, tried, untried, sources_untried, distance_m, verdict })
 }
 
-fn verdict(hypotheses: &mut [Hypothesis]) -> Verdict {
+fn verdict_on(found: &mut [Hypothesis]) -> Verdict {
     // Those that explain come first, also before a better fit that is contradicted.
-    hypotheses.sort_by_key(|h| !h.explains());
-    let alone = hypotheses.len() == 1;
-    let Some(best) = hypotheses.first().filter(|best| best.explains()) else { return Verdict::Unexplained };
-    let (limit, views) = best.fit.as_ref().map_or((0.0, 0), |fit| (TIMES * fit.relative.max(1e-4), fit.views));
-    let is_near =
-        |h: &&Hypothesis| h.explains() && h.fit.as_ref().is_some_and(|fit| fit.relative <= limit || fit.views < NEED);
-    let near = hypotheses.iter().take_while(is_near).count();
-    // With too few views to tell hypotheses apart, all of them are open. What was paired by what the images show rests on
-    // the answer itself.
-    if near == 1 && !best.pairing.is_by_content && (views >= NEED || alone) {
-        Verdict::Decided
-    } else {
-        Verdict::Ambiguous(near)
+    found.sort_by_key(|h| !h.explains());
+    let score = |h: &Hypothesis| Score {
+        misfit: misfit(h),
+        views: h.fit.as_ref().map_or(0, |fit| fit.views),
+        explains: h.explains(),
+    };
+    let scores: Vec<Score> = found.iter().map(score).collect();
+    match hypotheses::verdict(&scores) {
+        // What was paired by what the images show rests on the answer itself.
+        Verdict::Decided if found[0].pairing.is_by_content => Verdict::Ambiguous(1),
+        verdict => verdict,
     }
+}
+
+/// The misfit of a hypothesis, infinite without a solution.
+fn misfit(h: &Hypothesis) -> f64 {
+    h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative)
 }
 
 /// How common something is; fewer is commoner.
@@ -226,21 +188,8 @@ fn rarity(recording: &Recording, h: &Hypothesis) -> (usize, usize, usize, usize,
 }
 
 fn sort(recording: &Recording, hypotheses: &mut [Hypothesis]) {
-    let median_of = |h: &Hypothesis| h.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
-    hypotheses.sort_by(|a, b| {
-        median_of(a).total_cmp(&median_of(b)).then_with(|| rarity(recording, a).cmp(&rarity(recording, b)))
-    });
-    // Runs of equals, each measured by its first.
-    let mut start = 0;
-    while start < hypotheses.len() {
-        let limit = TIE * median_of(&hypotheses[start]) + 1e-7;
-        let end = start + hypotheses[start..].iter().take_while(|h| median_of(h) <= limit).count().max(1);
-        hypotheses[start..end].sort_by(|a, b| {
-            let views = |h: &Hypothesis| h.fit.as_ref().map_or(0, |fit| fit.views);
-            (rarity(recording, a), views(b)).cmp(&(rarity(recording, b), views(a)))
-        });
-        start = end;
-    }
+    let views = |h: &Hypothesis| h.fit.as_ref().map_or(0, |fit| fit.views);
+    sort_by_misfit(hypotheses, TIE, misfit, |h| (rarity(recording, h), Reverse(views(h))));
 }
 
 /// Hypotheses that give the same poses are one; what the others are called is kept.
@@ -273,14 +222,10 @@ fn sees_the_same(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> bool 
     }
     let (Source::Track(of_a), Source::Track(of_b)) = (a.source, b.source) else { return false };
     let (of_a, of_b) = (&recording.tracks[of_a].samples, &recording.tracks[of_b].samples);
+    let seen =
+        |h: &Hypothesis, sample: &Sample| h.camera_from_target(sample).map(Pose::<Camera, Target>::from_isometry);
     of_a.len() == of_b.len()
-        && of_a.iter().zip(of_b).all(|(of_a, of_b)| match (a.camera_from_target(of_a), b.camera_from_target(of_b)) {
-            (Some(a), Some(b)) => {
-                let (a, b) = (Pose::<Camera, Target>::from_isometry(a), Pose::<Camera, Target>::from_isometry(b));
-                is_copy(a.distance_to(&b))
-            }
-            (a, b) => a.is_none() && b.is_none(),
-        })
+        && of_a.iter().zip(of_b).all(|(of_a, of_b)| are_equal(seen(a, of_a), seen(b, of_b), (COPY, COPY)))
 }
 
 /// Whether every image has the same pose of the robot under both, however it is written and wherever it stands.
@@ -294,21 +239,15 @@ fn poses_are_equal(recording: &Recording, a: &Hypothesis, b: &Hypothesis) -> boo
     if is_same_series && a.pairing.image_of != b.pairing.image_of {
         return false;
     }
+    let within = if is_same_series { (1e-9, 1e-7) } else { (COPY, COPY) };
     let (of_a, of_b) = (by_image(a), by_image(b));
     of_a.len() == of_b.len()
-        && of_a.iter().zip(&of_b).all(|((image_a, a), (image_b, b))| {
-            image_a == image_b
-                && match (a, b) {
-                    (Some(a), Some(b)) if is_same_series => {
-                        let (metres, radians) = a.distance_to(b);
-                        metres < 1e-9 && radians < 1e-7
-                    }
-                    (Some(a), Some(b)) => is_copy(a.distance_to(b)),
-                    (a, b) => a.is_none() && b.is_none(),
-                }
-        })
+        && of_a.iter().zip(&of_b).all(|((image_a, a), (image_b, b))| image_a == image_b && are_equal(*a, *b, within))
 }
 
-fn is_copy((metres, radians): (f64, f64)) -> bool {
-    metres < COPY && radians < COPY
+/// Whether two poses are the same within metres and radians, or neither is there.
+fn are_equal<A: Frame, B: Frame>(a: Option<Pose<A, B>>, b: Option<Pose<A, B>>, within: (f64, f64)) -> bool {
+    let Some((a, b)) = a.zip(b) else { return a.is_none() && b.is_none() };
+    let (metres, radians) = a.distance_to(&b);
+    metres < within.0 && radians < within.1
 }

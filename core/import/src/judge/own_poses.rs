@@ -19,8 +19,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, UnitQuaternion};
 
-use super::{EXPLAINED, EXPLAINED_RAD};
 use crate::sight::Sight;
+use handeye_estimate::diagnose::hypotheses::{EXPLAINED, EXPLAINED_RAD};
 use handeye_estimate::handeye::closed_form::ClosedFormSolution;
 use handeye_geometry::se3;
 
@@ -48,13 +48,13 @@ pub(super) enum Whose {
 /// Whose poses a solution tells; `None`: those of an arm, as far as can be told. `over_noise` is the square of the residual of every
 /// view over what the noise of its corners causes.
 pub(super) fn whose(sight: &Sight, solution: &ClosedFormSolution, over_noise: &[f64]) -> Option<Whose> {
-    let is_camera = is_of_camera(solution.mount_from_camera.isometry(), sight.distance_m);
+    let is_camera = is_of_camera(solution.mount_from_camera.isometry(), sight.target.distance_m);
     let anchor_from_target = solution.anchor_from_target.isometry();
     if is_camera && (is_on_target(anchor_from_target, sight) || knows_the_noise(over_noise)) {
         return Some(Whose::Camera);
     }
     let apart_m = anchor_from_target.translation.vector.norm();
-    let is_same = apart_m < SAME * sight.distance_m && anchor_from_target.rotation.angle() < SAME;
+    let is_same = apart_m < SAME * sight.target.distance_m && anchor_from_target.rotation.angle() < SAME;
     is_same.then_some(Whose::OtherCamera)
 }
 
@@ -65,11 +65,11 @@ fn is_of_camera(mount_from_camera: &Isometry3<f64>, distance_m: f64) -> bool {
 fn is_on_target(anchor_from_target: &Isometry3<f64>, sight: &Sight) -> bool {
     let origin = anchor_from_target.inverse() * Point3::origin();
     let range = |axis: usize| {
-        let values = sight.outer.iter().map(|point| point[axis]);
+        let values = sight.target.outer.iter().map(|point| point[axis]);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
     let (x, y) = (range(0), range(1));
-    let tolerance_m = EXPLAINED * sight.distance_m;
+    let tolerance_m = EXPLAINED * sight.target.distance_m;
     let beside_m = (BESIDE * (x.1 - x.0).max(y.1 - y.0)).max(tolerance_m);
     let is_in = |at: f64, (low, high): (f64, f64)| (low - beside_m..=high + beside_m).contains(&at);
     is_in(origin.x, x)

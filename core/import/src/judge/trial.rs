@@ -1,27 +1,27 @@
-//! A hypothesis against the views: a robust closed form, what it leaves, and images that contradict it.
+//! A case against the views: what it leaves, and images that contradict it.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
-use std::ops::Deref;
 use std::rc::Rc;
 
 use nalgebra::Isometry3;
 
+use super::Sights;
 use super::cases::{Case, Paired};
 use super::field_of_view;
 use super::own_poses::{self, Whose};
-use super::{EXPLAINED, EXPLAINED_RAD, Sights, TIMES};
 use crate::conventions::{Direction, Reading};
 use crate::formats::tree::LEAST_POSES;
 use crate::hypothesis::{Fit, Hypothesis, Source};
 use crate::pairing::{self, Pairing};
-use crate::recording::{Recording, Role};
+use crate::recording::{Recording, Role, Sample};
 use crate::settings::Settings;
 use crate::sight::Sight;
-use handeye_estimate::diagnose::doctor::agreement::{self, agreement};
+use handeye_estimate::diagnose::hypotheses::agreement::chain;
+use handeye_estimate::diagnose::hypotheses::pairing::aligned;
+use handeye_estimate::diagnose::hypotheses::{self, EXPLAINED, EXPLAINED_RAD, Hypothesis as _, SeenTarget, rules_out};
 use handeye_estimate::handeye::closed_form::ClosedFormSolution;
-use handeye_estimate::handeye::numbering::alike;
-use handeye_estimate::handeye::{Mode, PosePair, subset};
+use handeye_estimate::handeye::{Mode, PosePair};
 use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median;
@@ -32,12 +32,10 @@ use handeye_wording::{Text, Value};
 /// A view disagrees beyond so many times the median, and beyond this part of the distance.
 const DISAGREES: f64 = 5.0;
 const DISAGREES_OF_DISTANCE: f64 = 3e-3;
-/// And to judge the best of them.
+/// Views by which the best are judged.
 const MOST_VIEWS: usize = 400;
 /// Views that disagree for which a pose that fits better is looked for among all.
 const MOST_LOOKED_FOR: usize = 50;
-/// Views by which the size of the target is looked at.
-const MOST_SCALED: usize = 30;
 
 /// What hypotheses are tried with.
 pub(super) struct Judge<'a> {
@@ -46,27 +44,19 @@ pub(super) struct Judge<'a> {
     pub paired: &'a [Paired],
     pub settings: &'a Settings,
     pub cancel: &'a CancelToken,
-    /// Series of the target that were read already: many cases share them.
-    pub read: RefCell<HashMap<(usize, Reading, Direction), Rc<Sight>>>,
+    /// What was seen, with what was read already of series: many cases share them.
+    pub read: RefCell<HashMap<(Source, Option<(Reading, Direction)>), Rc<Sight>>>,
     /// Series of which it was found that their poses are a camera's own, and why: no robot's for any other camera either.
     pub own: RefCell<BTreeMap<usize, Text>>,
 }
 
-/// What the camera saw.
-enum SightOf<'a> {
-    Images(&'a Sight),
-    Series(Rc<Sight>),
-}
-
-impl Deref for SightOf<'_> {
-    type Target = Sight;
-
-    fn deref(&self) -> &Sight {
-        match self {
-            Self::Images(sight) => sight,
-            Self::Series(sight) => sight,
-        }
-    }
+/// A case in a pairing, with what the camera saw.
+pub(super) struct Trial<'a> {
+    case: &'a Case,
+    samples: &'a [Sample],
+    sight: Rc<Sight>,
+    /// Poses of the series whose image shows the target, by their places, and that image.
+    seen: Vec<(usize, usize)>,
 }
 
 /// A pose of the robot with what the camera saw there.
@@ -76,92 +66,96 @@ struct View {
     pair: PosePair,
 }
 
-impl Judge<'_> {
-    fn sight_of(&self, source: Source, target_reading: Option<&(Reading, Direction)>) -> Option<SightOf<'_>> {
-        let (track, (reading, direction)) = match source {
-            Source::Stream(i) => return self.sights.streams.get(i)?.as_ref().map(SightOf::Images),
-            Source::Track(i) => (i, *target_reading?),
-        };
-        let read = || {
-            let samples = &self.recording.tracks[track].samples;
-            let seen = samples.iter().map(|s| Some(direction.of(&reading.transform(&s.numbers)?))).collect();
-            Rc::new(Sight::of_poses(self.sights.target.as_ref(), seen))
-        };
-        let mut known = self.read.borrow_mut();
-        Some(SightOf::Series(Rc::clone(known.entry((track, reading, direction)).or_insert_with(read))))
+impl Trial<'_> {
+    /// A pose of the series with what an image shows.
+    fn pair_of(&self, sample: usize, image: usize) -> Option<PosePair> {
+        let written = self.case.reading.transform(&self.samples.get(sample)?.numbers)?;
+        Some(PosePair {
+            anchor_from_mount: Pose::from_isometry(self.case.class.of(&written)),
+            camera_from_target: Pose::from_isometry((*self.sight.seen.get(image)?)?),
+        })
     }
 
-    pub fn distance_of(&self, case: &Case) -> f64 {
-        self.sight_of(case.source, case.target_reading.as_ref()).map_or(0.0, |sight| sight.distance_m)
+    fn all_views(&self) -> Vec<View> {
+        let view = |&(sample, image): &(usize, usize)| Some(View { sample, image, pair: self.pair_of(sample, image)? });
+        self.seen.iter().filter_map(view).collect()
+    }
+
+    /// How far a solution puts the target of an image from where it was seen with a pose of the series, metres.
+    fn misfit_at(&self, solution: &ClosedFormSolution, sample: usize, image: usize) -> Option<f64> {
+        Some(self.sight.target.misfit(solution, &self.pair_of(sample, image)?).0)
+    }
+
+    /// A pose that an image fits better than its own.
+    fn better(&self, solution: &ClosedFormSolution, view: &View, own_m: f64, limit: f64) -> Option<(usize, f64)> {
+        let others = (0..self.samples.len()).filter(|sample| *sample != view.sample);
+        let of = |sample: usize| Some((sample, self.misfit_at(solution, sample, view.image)?));
+        let best = others.filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (best.1 <= limit && rules_out(best.1, own_m)).then_some(best)
+    }
+}
+
+impl hypotheses::Hypothesis for Trial<'_> {
+    fn target(&self) -> &SeenTarget {
+        &self.sight.target
+    }
+
+    fn views(&self) -> usize {
+        self.seen.len()
+    }
+
+    fn pair(&self, view: usize) -> Option<PosePair> {
+        let (sample, image) = self.seen[view];
+        self.pair_of(sample, image)
+    }
+}
+
+impl Judge<'_> {
+    fn sight_of(&self, source: Source, target_reading: Option<(Reading, Direction)>) -> Option<Rc<Sight>> {
+        let mut known = self.read.borrow_mut();
+        if let Some(sight) = known.get(&(source, target_reading)) {
+            return Some(Rc::clone(sight));
+        }
+        let sight = match source {
+            Source::Stream(i) => self.sights.streams.get(i)?.clone()?,
+            Source::Track(i) => {
+                let (reading, direction) = target_reading?;
+                let samples = &self.recording.tracks[i].samples;
+                let seen = samples.iter().map(|s| Some(direction.of(&reading.transform(&s.numbers)?))).collect();
+                Sight::of_poses(self.sights.target.as_ref(), seen)
+            }
+        };
+        let sight = Rc::new(sight);
+        known.insert((source, target_reading), Rc::clone(&sight));
+        Some(sight)
     }
 
     pub fn sight_distance(&self, h: &Hypothesis) -> f64 {
-        self.sight_of(h.source, h.target_reading.as_ref()).map_or(0.0, |sight| sight.distance_m)
+        self.sight_of(h.source, h.target_reading).map_or(0.0, |sight| sight.target.distance_m)
     }
 
-    fn anchor_from_mount(&self, case: &Case, sample: usize) -> Option<Isometry3<f64>> {
-        let sample = self.recording.tracks[case.robot].samples.get(sample)?;
-        Some(case.class.of(&case.reading.transform(&sample.numbers)?))
+    pub fn pairing_of(&self, case: &Case) -> &Pairing {
+        &self.paired[case.pairing].pairing
     }
 
-    fn views(&self, case: &Case, pairing: &Pairing, sight: &Sight) -> Vec<View> {
-        let view = |(sample, image): (usize, &Option<usize>)| self.view(case, sight, sample, (*image)?);
-        pairing.image_of.iter().enumerate().filter_map(view).collect()
-    }
-
-    fn view(&self, case: &Case, sight: &Sight, sample: usize, image: usize) -> Option<View> {
-        let pair = PosePair {
-            anchor_from_mount: Pose::from_isometry(self.anchor_from_mount(case, sample)?),
-            camera_from_target: Pose::from_isometry((*sight.seen.get(image)?)?),
+    /// A case in a pairing; `None` where the camera saw nothing.
+    pub fn trial<'b>(&'b self, case: &'b Case, pairing: &Pairing) -> Option<Trial<'b>> {
+        let sight = self.sight_of(case.source, case.target_reading)?;
+        let of = |(sample, image): (usize, &Option<usize>)| {
+            image.filter(|image| matches!(sight.seen.get(*image), Some(Some(_)))).map(|image| (sample, image))
         };
-        Some(View { sample, image, pair })
+        let seen = pairing.image_of.iter().enumerate().filter_map(of).collect();
+        Some(Trial { case, samples: &self.recording.tracks[case.robot].samples, sight, seen })
     }
 
-    /// A solution and its median misfit.
-    pub fn solve(&self, case: &Case, most: usize, robust: bool) -> Option<(ClosedFormSolution, f64)> {
-        self.solve_paired(case, &self.paired[case.pairing].pairing, most, robust)
-    }
-
-    fn solve_paired(
-        &self,
-        case: &Case,
-        pairing: &Pairing,
-        most: usize,
-        robust: bool,
-    ) -> Option<(ClosedFormSolution, f64)> {
-        let sight = self.sight_of(case.source, case.target_reading.as_ref())?;
-        let is_seen = |image: usize| matches!(sight.seen.get(image), Some(Some(_)));
-        let seen: Vec<(usize, usize)> = pairing
-            .image_of
-            .iter()
-            .enumerate()
-            .filter_map(|(sample, image)| image.filter(|image| is_seen(*image)).map(|image| (sample, image)))
-            .collect();
-        let chosen = subset::spread(seen.len(), most).into_iter().map(|i| seen[i]);
-        let chosen: Vec<PosePair> =
-            chosen.filter_map(|(sample, image)| Some(self.view(case, &sight, sample, image)?.pair)).collect();
-        let found = agreement(&sight.outer, &alike(&chosen, &sight.turns), robust).ok()?;
-        Some((found.solution, found.median_m))
-    }
-
-    /// What is left at the median where the target is so many times as large, by the size that was said, metres.
-    pub fn misfit_of_scaled(&self, h: &Hypothesis, scale: f64) -> Option<f64> {
+    /// The target of a hypothesis, and its views without those that disagree.
+    pub fn agreeing(&self, h: &Hypothesis) -> Option<(SeenTarget, Vec<PosePair>)> {
         let case = Case::of(h);
-        let sight = self.sight_of(h.source, h.target_reading.as_ref())?;
-        let views = self.views(&case, &h.pairing, &sight);
-        let is_wrong =
+        let trial = self.trial(&case, &h.pairing)?;
+        let disagrees =
             |sample: usize| h.fit.as_ref().is_some_and(|fit| fit.disagreeing.iter().any(|(it, _)| *it == sample));
-        let right: Vec<&View> = views.iter().filter(|view| !is_wrong(view.sample)).collect();
-        let chosen: Vec<PosePair> =
-            subset::spread(right.len(), MOST_SCALED).into_iter().map(|i| right[i].pair).collect();
-        let scaled = |pair: PosePair| {
-            let mut seen = *pair.camera_from_target.isometry();
-            seen.translation.vector *= scale;
-            PosePair { camera_from_target: Pose::from_isometry(seen), ..pair }
-        };
-        let pairs: Vec<PosePair> = alike(&chosen, &sight.turns).into_iter().map(scaled).collect();
-        let outer = sight.outer.map(|point| point * scale);
-        Some(agreement(&outer, &pairs, false).ok()?.median_m / scale)
+        let views = trial.all_views().into_iter().filter(|view| !disagrees(view.sample));
+        Some((trial.sight.target.clone(), views.map(|view| view.pair).collect()))
     }
 
     /// What the size of the target would be called.
@@ -181,14 +175,15 @@ impl Judge<'_> {
 
     /// A case with all its views, under each of its names.
     pub fn judged(&self, case: &Case) -> Vec<Hypothesis> {
-        self.judged_paired(case, &self.paired[case.pairing].pairing)
+        self.judged_paired(case, self.pairing_of(case))
     }
 
     fn judged_paired(&self, case: &Case, pairing: &Pairing) -> Vec<Hypothesis> {
-        let sight = self.sight_of(case.source, case.target_reading.as_ref());
-        let solution = self.solve_paired(case, pairing, MOST_VIEWS, true).map(|(solution, _)| solution);
-        let judged = sight.zip(solution).map(|(sight, solution)| self.fit(case, pairing, &sight, &solution));
-        let (fit, contradictions) = judged.map_or((None, Vec::new()), |(fit, why)| (Some(fit), why));
+        let fit = self.trial(case, pairing).and_then(|trial| {
+            let solution = trial.solve(MOST_VIEWS, true).ok()?.solution;
+            Some(self.fit(&trial, &solution))
+        });
+        let (fit, contradictions) = fit.map_or((None, Vec::new()), |(fit, why)| (Some(fit), why));
         let one = |(mode, direction): &(Mode, Direction)| Hypothesis {
             source: case.source,
             robot: case.robot,
@@ -204,15 +199,16 @@ impl Judge<'_> {
         case.labels.iter().map(one).collect()
     }
 
-    fn fit(&self, case: &Case, pairing: &Pairing, sight: &Sight, solution: &ClosedFormSolution) -> (Fit, Vec<Text>) {
-        let views = self.views(case, pairing, sight);
-        let misfits: Vec<(f64, f64)> = views.iter().map(|v| misfit(sight, solution, &v.pair)).collect();
+    fn fit(&self, trial: &Trial<'_>, solution: &ClosedFormSolution) -> (Fit, Vec<Text>) {
+        let (case, target) = (trial.case, &trial.sight.target);
+        let views = trial.all_views();
+        let misfits: Vec<(f64, f64)> = views.iter().map(|view| target.misfit(solution, &view.pair)).collect();
         let median_m = median(misfits.iter().map(|m| m.0)).unwrap_or(f64::INFINITY);
         let median_rad = median(misfits.iter().map(|m| m.1)).unwrap_or(f64::INFINITY);
-        let limit = (DISAGREES * median_m).max(DISAGREES_OF_DISTANCE * sight.distance_m);
+        let limit = disagrees_m(median_m, target);
         let mut disagreeing = Vec::new();
-        let is_near = median_m < EXPLAINED * sight.distance_m && median_rad < EXPLAINED_RAD;
-        let own = is_near.then(|| self.own_poses(case, sight, solution, &views)).flatten();
+        let is_near = median_m < EXPLAINED * target.distance_m && median_rad < EXPLAINED_RAD;
+        let own = is_near.then(|| self.own_poses(trial, solution, &views)).flatten();
         let mut contradictions: Vec<Text> = own.into_iter().collect();
         let agrees = |sample: usize| {
             views.iter().zip(&misfits).any(|(view, (misfit_m, _))| view.sample == sample && *misfit_m <= limit)
@@ -226,16 +222,15 @@ impl Judge<'_> {
             // pose is wrong, or its image a copy: one view less, which says nothing of the others.
             if contradictions.len() < 3
                 && disagreeing.len() <= MOST_LOOKED_FOR
-                && let Some((other, other_m)) = self.better(case, sight, solution, view, *misfit_m, limit)
+                && let Some((other, other_m)) = trial.better(solution, view, *misfit_m, limit)
                 && !agrees(other)
             {
-                let samples = &self.recording.tracks[case.robot].samples;
                 contradictions.push(text!(
                     "{image} fits the pose of {other} ({other_mm} mm) and not that of {own} ({own_mm} mm)",
                     image = self.image_name(case.source, view.image),
-                    other = &*samples[other].place,
+                    other = &*trial.samples[other].place,
                     other_mm = format!("{:.1}", other_m * 1e3),
-                    own = &*samples[view.sample].place,
+                    own = &*trial.samples[view.sample].place,
                     own_mm = format!("{:.1}", misfit_m * 1e3)
                 ));
             }
@@ -249,7 +244,7 @@ impl Judge<'_> {
         }
         let fit = Fit {
             median_m,
-            relative: median_m / sight.distance_m,
+            relative: median_m / target.distance_m,
             median_rad,
             views: views.len(),
             disagreeing,
@@ -260,10 +255,11 @@ impl Judge<'_> {
     }
 
     /// That these poses are those of a camera, and none of a robot.
-    fn own_poses(&self, case: &Case, sight: &Sight, solution: &ClosedFormSolution, views: &[View]) -> Option<Text> {
+    fn own_poses(&self, trial: &Trial<'_>, solution: &ClosedFormSolution, views: &[View]) -> Option<Text> {
+        let (case, sight) = (trial.case, &*trial.sight);
         let over_noise = |view: &View| {
             // However the target was counted: its numbers say nothing of the noise.
-            let covariance = sight.covariances.get(view.image).filter(|_| sight.turns.is_empty())?.as_ref()?;
+            let covariance = sight.covariances.get(view.image).filter(|_| sight.target.turns.is_empty())?.as_ref()?;
             own_poses::over_noise(&chain(solution, &view.pair), view.pair.camera_from_target.isometry(), covariance)
         };
         let over_noise: Vec<f64> = views.iter().filter_map(over_noise).collect();
@@ -315,8 +311,7 @@ impl Judge<'_> {
     pub fn contradict_outside(&self, hypotheses: &mut [Hypothesis]) {
         let outside = |h: &Hypothesis| {
             let case = Case::of(h);
-            let sight = self.sight_of(h.source, h.target_reading.as_ref())?;
-            let views = self.views(&case, &h.pairing, &sight);
+            let views = self.trial(&case, &h.pairing)?.all_views();
             let seen: Vec<Isometry3<f64>> = views.iter().map(|view| *view.pair.camera_from_target.isometry()).collect();
             field_of_view::outside(&seen)
         };
@@ -337,26 +332,6 @@ impl Judge<'_> {
         }
     }
 
-    /// A pose that an image fits better than its own.
-    fn better(
-        &self,
-        case: &Case,
-        sight: &Sight,
-        solution: &ClosedFormSolution,
-        view: &View,
-        own_m: f64,
-        limit: f64,
-    ) -> Option<(usize, f64)> {
-        let count = self.recording.tracks[case.robot].samples.len();
-        let of = |sample: usize| {
-            let anchor_from_mount = Pose::from_isometry(self.anchor_from_mount(case, sample)?);
-            let (misfit_m, _) = misfit(sight, solution, &PosePair { anchor_from_mount, ..view.pair });
-            Some((sample, misfit_m))
-        };
-        let best = (0..count).filter(|s| *s != view.sample).filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1))?;
-        (best.1 <= limit && TIMES * best.1 < own_m).then_some(best)
-    }
-
     fn image_name(&self, source: Source, image: usize) -> Value {
         match source {
             Source::Stream(i) => self.recording.streams[i].images[image].shown().into(),
@@ -374,28 +349,22 @@ impl Judge<'_> {
                 && h.fit.as_ref().is_some_and(|fit| fit.relative < EXPLAINED)
         };
         for h in hypotheses.iter().filter(wants).take(4) {
-            let Some(sight) = self.sight_of(h.source, h.target_reading.as_ref()) else { continue };
-            let samples = self.recording.tracks[h.robot].samples.len();
-            let images = sight.seen.len();
-            if samples > MOST || images > MOST {
-                continue;
-            }
             let mut case = Case::of(h);
             let mut pairing = h.pairing.clone();
             for _ in 0..2 {
-                let Some((solution, median_m)) = self.solve_paired(&case, &pairing, MOST_VIEWS, true) else { break };
-                let leave_out = (DISAGREES * median_m).max(DISAGREES_OF_DISTANCE * sight.distance_m);
-                let cost = |sample: usize, image: usize| {
+                let Some(trial) = self.trial(&case, &pairing) else { break };
+                let (poses, images) = (trial.samples.len(), trial.sight.seen.len());
+                if poses > MOST || images > MOST {
+                    break;
+                }
+                let Ok(found) = trial.solve(MOST_VIEWS, true) else { break };
+                let leave_out = disagrees_m(found.median_m, &trial.sight.target);
+                let cost = |sample: usize, image: usize| match trial.sight.seen.get(image) {
+                    Some(Some(_)) => trial.misfit_at(&found.solution, sample, image).unwrap_or(f64::INFINITY),
                     // An image without the target says nothing against a pose.
-                    let Some(Some(seen)) = sight.seen.get(image) else { return 1.5 * leave_out };
-                    let Some(pose) = self.anchor_from_mount(&case, sample) else { return f64::INFINITY };
-                    let pair = PosePair {
-                        anchor_from_mount: Pose::from_isometry(pose),
-                        camera_from_target: Pose::from_isometry(*seen),
-                    };
-                    misfit(&sight, &solution, &pair).0
+                    _ => 1.5 * leave_out,
                 };
-                pairing = pairing::aligned(samples, images, leave_out, cost);
+                pairing = pairing::by_content(aligned(poses, images, leave_out, cost));
             }
             if pairing.count() < LEAST_POSES || pairing.image_of == h.pairing.image_of {
                 continue;
@@ -407,21 +376,7 @@ impl Judge<'_> {
     }
 }
 
-/// Where a solution puts the target as the camera sees it.
-fn chain(solution: &ClosedFormSolution, pair: &PosePair) -> Isometry3<f64> {
-    let chain = solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
-    *chain.isometry()
-}
-
-/// How far a solution puts the target from where it was seen, metres and radians; of a target that looks the same after a
-/// turn in the nearest way to count it.
-fn misfit(sight: &Sight, solution: &ClosedFormSolution, pair: &PosePair) -> (f64, f64) {
-    let chain = chain(solution, pair);
-    let seen = *pair.camera_from_target.isometry();
-    let of = |seen: &Isometry3<f64>| {
-        (agreement::misfit(&sight.outer, &chain, seen), chain.rotation.angle_to(&seen.rotation))
-    };
-    let ways = std::iter::once(seen).chain(sight.turns.others(&seen)).map(|seen| of(&seen));
-    // The first of equals, which is as it was detected.
-    ways.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, f64::INFINITY))
+/// Misfit beyond which a view disagrees, metres.
+fn disagrees_m(median_m: f64, target: &SeenTarget) -> f64 {
+    (DISAGREES * median_m).max(DISAGREES_OF_DISTANCE * target.distance_m)
 }

@@ -1,52 +1,52 @@
-//! Gross hypotheses: poses inverted or in another unit of length or of angles, quaternion order, camera elsewhere, images and poses out of step.
+//! Gross hypotheses: poses inverted or in another unit of length or of angles, quaternion order, camera elsewhere, images and
+//! poses out of step.
 //!
-//! Each is a change of the reported poses. Under each the closed forms are solved anew, and the distance between where
-//! the chain puts the board and where the camera saw it is compared: it is measured on the camera's side, in millimetres,
-//! so it means the same under all of them.
+//! Each is a change of the reported poses, tried by the engine of [`hypotheses`](crate::diagnose::hypotheses).
 
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
-
-use super::agreement::{Agreement, agreement, pairs_of};
-use super::pairing::{self, Pairing};
-use super::views::SessionViews;
+use super::pairing::Pairing;
+use super::views::{SessionView, SessionViews};
 use crate::diagnose::findings::FindingCode;
-use crate::handeye::{HandEyeError, subset};
+use crate::diagnose::hypotheses::agreement::Agreement;
+use crate::diagnose::hypotheses::conventions::{AngleUnit, Direction, Euler, LengthUnit, Reading, RotationForm};
+use crate::diagnose::hypotheses::{
+    self, CLEAR, EXPLAINED, Hypothesis, Score, Search, SeenTarget, Verdict, ranked, sort_by_misfit, steps,
+};
+use crate::handeye::{HandEyeError, PosePair};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::Work;
 
 /// Views that are looked at: enough for any gross fault.
 const MOST_VIEWS: usize = 24;
-/// Least views: with three any hypothesis fits half of them.
-pub(super) const NEED: usize = 4;
-/// A misfit below this part of the board's distance is no gross fault: arms that are off by 3 mm half a metre away stay below.
-const SOUND: f64 = 0.01;
-/// A hypothesis that explains the poses leaves less than this part of the board's distance, which is ten times what such arms
-/// leave.
-const EXPLAINED: f64 = 0.05;
-/// And so many times less than the poses as they are. By the three together no gross fault was accused in 3,000 healthy
-/// simulated sessions, and those that were injected are found (`docs/studies/diagnosis.md`).
-pub(super) const TIMES: f64 = 3.0;
-/// Hypotheses within this factor of the best count as equal; the simplest of them is taken. Two that are the same equations
-/// differ by rounding.
+/// Hypotheses within this factor of the best count as equal; the simplest of them is taken.
 const TIE: f64 = 1.5;
 
-/// How the numbers of a quaternion were mixed up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Order {
-    /// The file has w x y z and was read as x y z w.
-    WFirst,
-    /// The file has x y z w and was read as w x y z.
-    WLast,
+/// What the numbers of rotations were read as, and what they are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Misread {
+    stated: Reading,
+    meant: Reading,
+    /// Which way the file has its poses: inverse ones were inverted on reading.
+    written: Direction,
 }
 
-/// How the angles of rotations were written that are in radians and were read as degrees. The other way round the table is refused:
+const fn misread([stated, meant]: [(RotationForm, AngleUnit); 2]) -> Misread {
+    const fn reading((rotation, angle): (RotationForm, AngleUnit)) -> Reading {
+        Reading { length: LengthUnit::Metre, angle, rotation }
+    }
+    Misread { stated: reading(stated), meant: reading(meant), written: Direction::Forward }
+}
+
+const XYZW: (RotationForm, AngleUnit) = (RotationForm::Xyzw, AngleUnit::Radian);
+const WXYZ: (RotationForm, AngleUnit) = (RotationForm::Wxyz, AngleUnit::Radian);
+/// The order of quaternions.
+const ORDERS: [Misread; 2] = [misread([XYZW, WXYZ]), misread([WXYZ, XYZW])];
+
+/// Rotation vectors, and roll, pitch and yaw, in radians that were read as degrees. The other way round the table is refused:
 /// degrees are soon more than the two turns that a controller reports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Angles {
-    /// Axis times angle.
-    Vector,
-    /// Roll, pitch and yaw.
-    Rpy,
+const ANGLES: [Misread; 2] = [radians(RotationForm::Vector), radians(RotationForm::Euler(Euler::RPY))];
+
+const fn radians(form: RotationForm) -> Misread {
+    misread([(form, AngleUnit::Degree), (form, AngleUnit::Radian)])
 }
 
 /// Turns of radians that were read as degrees are no larger, radians: three angles of half a turn each.
@@ -58,12 +58,8 @@ const OTHER_UNITS: [f64; 8] = [0.1, 10.0, 1e-2, 1e2, 25.4, 1.0 / 25.4, 0.0254, 1
 /// A change of the reported poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Change {
-    inverted: bool,
-    order: Option<Order>,
-    /// The quaternion was mixed up before the pose was inverted on reading.
-    order_in_inverse: bool,
-    /// Degrees are radians.
-    angles: Option<Angles>,
+    direction: Direction,
+    misread: Option<Misread>,
     /// Factor on all lengths.
     pub unit: f64,
     /// Which row of the table each image belongs to.
@@ -71,130 +67,88 @@ pub(super) struct Change {
 }
 
 impl Change {
-    pub const NONE: Self = Self {
-        inverted: false,
-        order: None,
-        order_in_inverse: false,
-        angles: None,
-        unit: 1.0,
-        pairing: Pairing::AsGiven,
-    };
+    pub const NONE: Self = Self { direction: Direction::Forward, misread: None, unit: 1.0, pairing: Pairing::AsGiven };
 
-    /// Number of things changed.
-    fn count(&self) -> usize {
-        usize::from(self.inverted)
-            + usize::from(self.order.is_some())
-            + usize::from(self.angles.is_some())
-            + usize::from(self.unit != 1.0)
-            + usize::from(self.pairing != Pairing::AsGiven)
-    }
-
-    /// What is said of the poses, the gravest first.
+    /// What is said of the poses, the gravest first: one code for each thing changed.
     pub fn codes(&self) -> Vec<FindingCode> {
-        let mut codes = Vec::new();
-        if self.inverted {
-            codes.push(FindingCode::InvertedPoses);
-        }
-        if self.order.is_some() {
-            codes.push(FindingCode::WrongQuaternionOrder);
-        }
-        if self.angles.is_some() {
-            codes.push(FindingCode::WrongAngleUnit);
-        }
-        if self.unit != 1.0 {
-            codes.push(FindingCode::WrongLengthUnit);
-        }
-        if self.pairing != Pairing::AsGiven {
-            codes.push(FindingCode::ShiftedPoses);
-        }
-        codes
+        let of_rotations = |misread: Misread| {
+            let is_angles = misread.meant.rotation.has_angles();
+            if is_angles { FindingCode::WrongAngleUnit } else { FindingCode::WrongQuaternionOrder }
+        };
+        let inverted = (self.direction == Direction::Inverse).then_some(FindingCode::InvertedPoses);
+        let unit = (self.unit != 1.0).then_some(FindingCode::WrongLengthUnit);
+        let shifted = (self.pairing != Pairing::AsGiven).then_some(FindingCode::ShiftedPoses);
+        [inverted, self.misread.map(of_rotations), unit, shifted].into_iter().flatten().collect()
     }
 
     pub fn w_first(&self) -> bool {
-        self.order == Some(Order::WFirst)
+        self.misread.is_some_and(|misread| misread.meant.rotation == RotationForm::Wxyz)
     }
 
-    fn of_pose(&self, pose: &Pose<Base, Tip>) -> Pose<Base, Tip> {
-        let pose = *pose.isometry();
-        let written = if self.order_in_inverse { pose.inverse() } else { pose };
-        let written = self.order.map_or(written, |order| reordered(&written, order));
-        let written = self.angles.map_or(written, |angles| in_radians(&written, angles));
-        let mut pose = if self.order_in_inverse { written.inverse() } else { written };
+    fn of_pose(&self, pose: &Pose<Base, Tip>) -> Option<Pose<Base, Tip>> {
+        let mut pose = *pose.isometry();
+        if let Some(Misread { stated, meant, written }) = &self.misread {
+            pose = written.of(&meant.transform(&stated.numbers(&written.of(&pose))?)?);
+        }
         pose.translation.vector *= self.unit;
-        Pose::from_isometry(if self.inverted { pose.inverse() } else { pose })
+        Some(Pose::from_isometry(self.direction.of(&pose)))
     }
 }
 
-/// Undoes a wrong order of the quaternion's numbers.
-fn reordered(pose: &Isometry3<f64>, order: Order) -> Isometry3<f64> {
-    let q = pose.rotation.coords;
-    // `coords` are x y z w; `Quaternion::new` takes w first.
-    let q = match order {
-        Order::WFirst => Quaternion::new(q.x, q.y, q.z, q.w),
-        Order::WLast => Quaternion::new(q.z, q.w, q.x, q.y),
-    };
-    Isometry3::from_parts(pose.translation, UnitQuaternion::from_quaternion(q))
-}
-
-/// The pose of which the angles were read as degrees and are radians.
-fn in_radians(pose: &Isometry3<f64>, angles: Angles) -> Isometry3<f64> {
-    let rotation = match angles {
-        Angles::Vector => UnitQuaternion::from_scaled_axis(pose.rotation.scaled_axis() * 1f64.to_degrees()),
-        Angles::Rpy => {
-            let (roll, pitch, yaw) = pose.rotation.euler_angles();
-            UnitQuaternion::from_euler_angles(roll.to_degrees(), pitch.to_degrees(), yaw.to_degrees())
-        }
-    };
-    Isometry3::from_parts(pose.translation, rotation)
-}
-
-/// Every change that is tried.
+/// Every change that is tried, those of one thing first.
 fn changes(sight: &SessionViews) -> Vec<Change> {
-    let mut all = changes_of_poses();
-    let is_small = |view: &super::views::SessionView| view.base_from_tip.rotation().angle() < LARGEST_OF_DEGREES;
-    if sight.views.iter().all(is_small) {
-        all.extend(changes_of_angles());
-    }
+    let is_small = |view: &SessionView| view.base_from_tip.rotation().angle() < LARGEST_OF_DEGREES;
+    let mut all = changes_of_poses(sight.views.iter().all(is_small));
     all.extend(Pairing::all(sight).into_iter().map(|pairing| Change { pairing, ..Change::NONE }));
-    all.sort_by_key(Change::count);
+    all.sort_by_key(|change| change.codes().len());
     all
 }
 
-/// Every way in which single poses may have been misread.
-fn changes_of_poses() -> Vec<Change> {
-    let mut all = Vec::new();
-    let orders = [
-        (None, false),
-        (Some(Order::WFirst), false),
-        (Some(Order::WLast), false),
-        (Some(Order::WFirst), true),
-        (Some(Order::WLast), true),
-    ];
+/// Every way in which single poses may have been misread, with radians as degrees where those are small.
+fn changes_of_poses(with_angles: bool) -> Vec<Change> {
+    let angles = ANGLES.into_iter().filter(|_| with_angles);
+    let both = |misread| Direction::ALL.map(|written| Some(Misread { written, ..misread }));
+    let misreads: Vec<_> = std::iter::once(None).chain(ORDERS.into_iter().chain(angles).flat_map(both)).collect();
+    let mut all: Vec<Change> = OTHER_UNITS.map(|unit| Change { unit, ..Change::NONE }).into();
     for unit in [1.0, 1e-3, 1e3] {
-        for inverted in [false, true] {
-            for (order, order_in_inverse) in orders {
-                all.push(Change { inverted, order, order_in_inverse, unit, ..Change::NONE });
-            }
+        for direction in Direction::ALL {
+            all.extend(misreads.iter().map(|misread| Change { direction, misread: *misread, unit, ..Change::NONE }));
         }
     }
-    all.retain(|c| *c != Change::NONE);
-    all.extend(OTHER_UNITS.map(|unit| Change { unit, ..Change::NONE }));
+    all.retain(|change| *change != Change::NONE);
     all
 }
 
-/// The ways in which radians may have been read as degrees.
-fn changes_of_angles() -> Vec<Change> {
-    let mut all = Vec::new();
-    for angles in [Angles::Vector, Angles::Rpy] {
-        for unit in [1.0, 1e-3, 1e3] {
-            for inverted in [false, true] {
-                for order_in_inverse in [false, true] {
-                    all.push(Change { angles: Some(angles), unit, inverted, order_in_inverse, ..Change::NONE });
-                }
-            }
-        }
+/// The views under a change.
+struct Changed<'a> {
+    sight: &'a SessionViews,
+    change: Change,
+    /// The row of each view.
+    rows: Vec<Option<usize>>,
+}
+
+impl<'a> Changed<'a> {
+    fn new(sight: &'a SessionViews, change: Change) -> Self {
+        Self { sight, change, rows: change.pairing.rows(sight) }
     }
-    all
+}
+
+impl Hypothesis for Changed<'_> {
+    fn target(&self) -> &SeenTarget {
+        &self.sight.target
+    }
+
+    fn views(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn pair(&self, view: usize) -> Option<PosePair> {
+        let base_from_tip = self.change.of_pose(&self.sight.table[self.rows[view]?].base_from_tip?)?;
+        Some(PosePair {
+            anchor_from_mount: self.sight.mode.anchor_from_mount(&base_from_tip),
+            camera_from_target: Pose::from_isometry(self.sight.views[view].camera_from_target),
+        })
+    }
 }
 
 /// A change and what it leaves.
@@ -217,26 +171,26 @@ pub(super) struct Gross {
 
 /// Tries everything. `None` when it was cancelled.
 pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
-    let as_given = solve(sight, &Change::NONE, true);
-    let given_m = as_given.as_ref().map_or(f64::INFINITY, |a| a.median_m);
-    let sound = given_m < SOUND * sight.distance_m;
-    let mut tried = Vec::new();
-    for change in changes(sight) {
-        if work.is_cancelled() {
-            return None;
-        }
-        if let Ok(agreement) = solve(sight, &change, !sound) {
-            tried.push(Tried { change, agreement });
-        }
+    let (views, distance_m) = (sight.views.len(), sight.target.distance_m);
+    let as_given = Changed::new(sight, Change::NONE).solve(usize::MAX, true);
+    let given = as_given.as_ref().map_or(f64::INFINITY, |agreement| agreement.median_m / distance_m);
+    let changes = changes(sight);
+    let search =
+        Search { most_views: MOST_VIEWS, most_robust: usize::MAX, unlike_rad: &|_index| 0.0, as_stated: Some(given) };
+    let found = ranked(changes.len(), |index| Some(Changed::new(sight, changes[index])), &search, work);
+    if work.is_cancelled() {
+        return None;
     }
-    tried.sort_by(|a, b| a.agreement.median_m.total_cmp(&b.agreement.median_m));
-    if let Some(best_m) = tried.first().map(|t| t.agreement.median_m) {
-        let near = tried.iter().take_while(|t| t.agreement.median_m <= TIE * best_m).count();
-        tried[..near].sort_by_key(|t| t.change.count());
-    }
-    let views = sight.views.len();
-    let explains = |so_m: f64, given_m: f64| so_m < EXPLAINED * sight.distance_m && TIMES * so_m < given_m;
-    let mut accused = views >= NEED && !sound && tried.first().is_some_and(|t| explains(t.agreement.median_m, given_m));
+    let of = |it: hypotheses::Ranked| Some(Tried { change: changes[it.index], agreement: it.agreement? });
+    let mut tried: Vec<Tried> = found.into_iter().filter_map(of).collect();
+    let misfit = |tried: &Tried| tried.agreement.median_m / distance_m;
+    sort_by_misfit(&mut tried, TIE, misfit, |tried| tried.change.codes().len());
+    // What was stated stays until it is ruled out.
+    let score = |misfit: f64, explains: bool| Score { misfit, views, explains };
+    let mut accused = given >= CLEAR
+        && tried.first().map(misfit).is_some_and(|best| {
+            hypotheses::verdict(&[score(best, best < EXPLAINED), score(given, true)]) == Verdict::Decided
+        });
     // Half of the views may be in step and the other half not: the median says nothing of the rest.
     if !accused && let Some(stepped) = stepped(sight, as_given.as_ref().ok()) {
         tried.insert(0, stepped);
@@ -247,35 +201,31 @@ pub(super) fn gross(sight: &SessionViews, work: &Work<'_>) -> Option<Gross> {
 
 /// A step in the pairing of images and poses that explains what the poses as they are leave; `None` when there is none.
 fn stepped(sight: &SessionViews, as_given: Option<&Agreement>) -> Option<Tried> {
-    let wrong_m = SOUND * sight.distance_m;
+    let wrong_m = CLEAR * sight.target.distance_m;
+    let paired = |pairing: Pairing| Changed::new(sight, Change { pairing, ..Change::NONE });
+    let stated = paired(Pairing::AsGiven);
     let given = as_given.map(|agreement| &agreement.solution);
-    if pairing::wrong(sight, Pairing::AsGiven, given, wrong_m).len() < pairing::LEAST_BESIDE {
+    if steps::wrong(&stated, given, wrong_m).len() < steps::LEAST_BESIDE {
         return None;
     }
-    let change = Change { pairing: pairing::best_step(sight)?, ..Change::NONE };
-    let agreement = solve(sight, &change, true).ok()?;
-    let explained = pairing::explains(sight, change.pairing, given, &agreement.solution, wrong_m);
-    explained.then_some(Tried { change, agreement })
-}
-
-/// The views with a changed robot pose, and what they agree on.
-fn solve(sight: &SessionViews, change: &Change, thorough: bool) -> Result<Agreement, HandEyeError> {
-    let count = sight.views.len();
-    let pose_of = |i: usize| Some(change.of_pose(&change.pairing.pose_of(sight, i)?));
-    let all: Vec<Pose<Base, Tip>> = (0..count).map(|i| pose_of(i).unwrap_or_else(Pose::identity)).collect();
-    let pairs = pairs_of(sight, &all);
-    let most = if *change == Change::NONE { usize::MAX } else { MOST_VIEWS };
-    let chosen: Vec<_> = subset::spread(count, most).into_iter().filter(|i| pose_of(*i).is_some()).collect();
-    let chosen: Vec<_> = chosen.into_iter().map(|i| pairs[i]).collect();
-    agreement(&sight.outer, &chosen, thorough)
+    let step = steps::best_step(|by| paired(Pairing::Shifted(by)))?;
+    let stepped = paired(Pairing::Stepped(step));
+    let agreement = stepped.solve(MOST_VIEWS, true).ok()?;
+    let explained = steps::explains(step, (&stated, given), (&stepped, &agreement.solution), wrong_m);
+    explained.then_some(Tried { change: stepped.change, agreement })
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector6;
+    use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector6};
 
     use super::*;
+    use crate::diagnose::hypotheses::steps::Step;
+    use crate::handeye::Mode;
+    use crate::handeye::closed_form::ClosedFormSolution;
     use handeye_geometry::se3;
+    use handeye_simulate::links::Links;
+    use handeye_simulate::session::{Setup, links, observed};
 
     #[test]
     fn a_mixed_up_quaternion_is_put_right_in_both_orders() {
@@ -283,18 +233,49 @@ mod tests {
         let q = truth.rotation.coords;
         let read_w_first = Quaternion::new(q.z, q.w, q.x, q.y);
         let read_w_last = Quaternion::new(q.x, q.y, q.z, q.w);
-        for (order, read) in [(Order::WFirst, read_w_first), (Order::WLast, read_w_last)] {
+        for (misread, read) in ORDERS.into_iter().zip([read_w_first, read_w_last]) {
             let wrong = Isometry3::from_parts(truth.translation, UnitQuaternion::from_quaternion(read));
-            assert!(reordered(&wrong, order).rotation.angle_to(&truth.rotation) < 1e-12, "{order:?}");
+            let change = Change { misread: Some(misread), ..Change::NONE };
+            let right = change.of_pose(&Pose::from_isometry(wrong)).expect("a pose");
+            assert!(right.rotation().angle_to(&truth.rotation) < 1e-12, "{misread:?}");
         }
     }
 
     #[test]
     fn the_changes_are_all_different() {
-        let all = changes_of_poses();
-        assert_eq!(all.len(), 29 + OTHER_UNITS.len());
+        let all = changes_of_poses(true);
+        assert_eq!(all.len(), changes_of_poses(false).len() + 24);
         for (i, change) in all.iter().enumerate() {
             assert!(!all[..i].contains(change), "{change:?}");
         }
+    }
+
+    /// A step explains what it repairs, not what the solution beside it happens to suit better.
+    #[test]
+    fn a_step_is_believed_by_the_views_that_it_pairs_anew() {
+        let healthy = SessionViews::new(&observed(&Setup::new(Mode::EyeInHand, 14, 71)), None).expect("views");
+        let Links { mount_from_camera, anchor_from_target, .. } = links(Mode::EyeInHand);
+        let right = ClosedFormSolution { mount_from_camera, anchor_from_target };
+        let off = Vector6::new(0.02, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let poor = ClosedFormSolution { mount_from_camera: mount_from_camera.perturbed(&off), anchor_from_target };
+        let wrong_m = 0.01 * healthy.target.distance_m;
+        let explains = |sight: &SessionViews, step: Step| {
+            let [stated, stepped] = [Pairing::AsGiven, Pairing::Stepped(step)]
+                .map(|pairing| Changed::new(sight, Change { pairing, ..Change::NONE }));
+            let wrong = [(&stated, &poor), (&stepped, &right)].map(|(h, by)| steps::wrong(h, Some(by), wrong_m));
+            (wrong, steps::explains(step, (&stated, Some(&poor)), (&stepped, &right), wrong_m))
+        };
+        let ([as_stated, stepped], explained) = explains(&healthy, Step { from: 11, before: 0, after: -2 });
+        assert_eq!((as_stated.len(), stepped), (14, vec![11, 12, 13]));
+        assert!(!explained, "all it does is give the last views up");
+
+        // The last views have poses of two rows further, which the step undoes.
+        let mut shifted = observed(&Setup::new(Mode::EyeInHand, 14, 71));
+        let poses: Vec<_> = shifted.views.iter().map(|view| view.base_from_tip).collect();
+        for (view, pose) in shifted.views[9..14].iter_mut().zip(&poses[7..12]) {
+            view.base_from_tip = *pose;
+        }
+        let shifted = SessionViews::new(&shifted, None).expect("views");
+        assert!(explains(&shifted, Step { from: 7, before: 0, after: 2 }).1);
     }
 }

@@ -207,7 +207,7 @@ fn matters(model: &Model<'_>, judged: &Judged) -> bool {
         Effect::Scale => size >= LEAST_SCALE,
         Effect::Joint(_) => size >= LEAST_JOINT_RAD,
         Effect::Warp => {
-            let [a, b, c, _] = model.sight.outer;
+            let [a, b, c, _] = model.sight.target.outer;
             size >= LEAST_WARP * (b - a).norm().max((c - a).norm())
         }
         Effect::Lens => model.sight.intrinsics.is_some_and(|camera| {

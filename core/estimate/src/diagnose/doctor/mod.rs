@@ -1,10 +1,10 @@
 //! What is wrong with a session: hypotheses about the data, each with how much better it explains them.
 //!
 //! # What it tests
-//! Gross faults of how poses were written down ([`gross`]): inverted poses or the wrong mode (the same equations),
-//! millimetres against metres, the order of quaternions, images and poses out of step. Then, in a linear Gaussian model of
-//! pose pairs ([`model`]): a target that is not of its stated size or is bent, intrinsics that do not fit, a target or a
-//! camera that moved during the session, the zero of a joint, views that contradict the others.
+//! Gross faults of how poses were written down and paired, with [`hypotheses`](super::hypotheses): inverted poses or the wrong
+//! mode (the same equations), millimetres against metres, the order of quaternions, images and poses out of step. Then, in a
+//! linear Gaussian model of pose pairs ([`model`]): a target that is not of its stated size or is bent, intrinsics that do not
+//! fit, a target or a camera that moved during the session, the zero of a joint, views that contradict the others.
 //!
 //! # How it decides
 //! A gross fault is accused when it brings the board together at least three times better, and to within a twentieth
@@ -18,7 +18,6 @@
 //! [`Diagnosis::untested`] says so, and the findings say what is. Views out of the fit count for nothing. Of more than
 //! [`MOST_VIEWS`] views so many are examined, spread over the session.
 
-pub mod agreement;
 mod claim;
 mod effect;
 mod gross;
@@ -37,6 +36,7 @@ use serde::Serialize;
 use crate::claim::Claim;
 use crate::diagnose::Calibration;
 use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
+use crate::diagnose::hypotheses::NEED;
 use crate::{Fit, Observations};
 use handeye_geometry::progress::Work;
 use handeye_geometry::targets::observation;
@@ -221,8 +221,8 @@ fn examine(
     diagnosis.findings.extend(words::not_finite(&sight));
     diagnosis.findings.extend(words::wrong_corners(&sight));
     let views = sight.views.len();
-    if views < gross::NEED {
-        return Err(format!("views with the target and a robot pose: {views}, {} are needed", gross::NEED));
+    if views < NEED {
+        return Err(format!("views with the target and a robot pose: {views}, {NEED} are needed"));
     }
     if let Some(behind) = words::behind_the_camera(&sight) {
         diagnosis.findings.push(behind);
@@ -235,7 +235,7 @@ fn examine(
         return Ok(());
     }
     let start = gross.as_given.map_err(|error| error.to_string())?;
-    if start.median_m > HOPELESS * sight.distance_m {
+    if start.median_m > HOPELESS * sight.target.distance_m {
         diagnosis.findings.push(words::hopeless(&sight, start.median_m));
         return Ok(());
     }

@@ -424,7 +424,9 @@ fn nearer(
     view: &super::views::SessionView,
     chain: &nalgebra::Isometry3<f64>,
 ) -> nalgebra::Isometry3<f64> {
-    let off = |pose: &nalgebra::Isometry3<f64>| super::agreement::misfit(&sight.outer, chain, pose);
+    let off = |pose: &nalgebra::Isometry3<f64>| {
+        crate::diagnose::hypotheses::agreement::misfit(&sight.target.outer, chain, pose)
+    };
     match &view.alternative {
         Some(other) if off(other) < off(&view.camera_from_target) => *other,
         _ => view.camera_from_target,

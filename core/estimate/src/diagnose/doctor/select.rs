@@ -1,7 +1,6 @@
 //! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
 //! judged anew beside it.
 
-use super::agreement::Agreement;
 use super::effect::Effect;
 use super::judge::{Judged, LEAST_SCALE, confirm, judge};
 use super::model::{Fit, Levels, Model, State};
@@ -9,6 +8,7 @@ use super::screen::{Candidate, screened};
 use super::views::SessionViews;
 use super::weight::Weight;
 use crate::TargetSize;
+use crate::diagnose::hypotheses::agreement::Agreement;
 use crate::handeye::joint::field::Places;
 use handeye_geometry::progress::Work;
 
@@ -49,7 +49,7 @@ pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
     let noise_m = start.median_m / 3.0;
-    let mut levels = Levels::even([noise_m, noise_m / sight.distance_m.max(0.01)].map(|sigma| sigma.powi(2)));
+    let mut levels = Levels::even([noise_m, noise_m / sight.target.distance_m.max(0.01)].map(|sigma| sigma.powi(2)));
     // The majority says where the equations are made linear; with many far views there is none, and all are taken.
     let majority = State { effects: Vec::new(), aside: if far.len() <= most_aside { far.clone() } else { Vec::new() } };
     for _ in 0..ROUNDS {

@@ -1,17 +1,16 @@
 //! What the images alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
 
-use std::cmp::Ordering;
-
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
 
+use crate::diagnose::hypotheses::SeenTarget;
 use crate::handeye::joint::CornerWeights;
+use crate::handeye::numbering::Turns;
 use crate::handeye::{Mode, subset};
 use crate::intrinsics::evidence::{Scatter, Score, scatter};
 use crate::intrinsics::{self, Options, SeenView};
 use crate::{CameraKnowledge, Observations, ObservedView, resolution};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_geometry::natural_order;
 use handeye_geometry::planar_pose::refine::refine;
 use handeye_geometry::planar_pose::{self, PlanarPose};
 use handeye_geometry::progress::CancelToken;
@@ -40,11 +39,8 @@ const NOISY: f64 = 2.0;
 
 /// A row of the pose table, whether the target was seen in its image or not.
 pub(crate) struct TableRow {
+    pub name: String,
     pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// Place of its image when the images are sorted by number (1, 2, 10).
-    pub rank_by_number: usize,
-    /// And letter by letter (1, 10, 2).
-    pub rank_by_letters: usize,
 }
 
 /// One view with a robot pose and a pose of the target.
@@ -86,36 +82,14 @@ pub struct SessionViews {
     pub(crate) form_gradient: DVector<f64>,
     /// Degrees of freedom of how the views scatter, which the variances of a lens given and of a bend rest on.
     pub(crate) form_freedom: f64,
-    /// Four outer points of the target.
-    pub outer: [Point3<f64>; 4],
+    /// The target.
+    pub target: SeenTarget,
     /// `xiᵀ K xi` is the mean squared displacement of the target's points by a small motion `xi` of it, m².
     pub(crate) displacement: Matrix6<f64>,
-    /// Median distance of the target's middle from the camera, metres.
-    pub distance_m: f64,
 }
 
 /// A view with its row in the table.
 type Row<'a> = (usize, &'a ObservedView);
-
-fn table(views: &[&ObservedView]) -> Vec<TableRow> {
-    let ranks = |order: fn(&str, &str) -> Ordering| {
-        let mut sorted: Vec<usize> = (0..views.len()).collect();
-        sorted.sort_by(|a, b| order(&views[*a].name, &views[*b].name));
-        let mut ranks = vec![0; views.len()];
-        for (rank, row) in sorted.into_iter().enumerate() {
-            ranks[row] = rank;
-        }
-        ranks
-    };
-    let (by_number, by_letters) = (ranks(natural_order::compare), ranks(Ord::cmp));
-    let rows = views.iter().zip(by_number).zip(by_letters);
-    let row = |((view, rank_by_number), rank_by_letters): ((&&ObservedView, usize), usize)| TableRow {
-        base_from_tip: view.base_from_tip.filter(Pose::is_finite),
-        rank_by_number,
-        rank_by_letters,
-    };
-    rows.map(row).collect()
-}
 
 struct Fit {
     corners: Corners,
@@ -146,11 +120,15 @@ impl SessionViews {
             .filter(|(_, v)| v.base_from_tip.is_some() && (v.corners.is_some() || v.camera_from_target.is_some()))
             .collect();
         let seen: Vec<Row<'_>> = subset::spread(seen.len(), super::MOST_VIEWS).into_iter().map(|i| seen[i]).collect();
+        let row = |view: &&ObservedView| TableRow {
+            name: view.name.clone(),
+            base_from_tip: view.base_from_tip.filter(Pose::is_finite),
+        };
         let (outer, displacement) = board(&observations.target.points());
         let mut sight = Self {
             mode,
             views: Vec::new(),
-            table: table(&in_fit),
+            table: in_fit.iter().map(row).collect(),
             not_finite,
             intrinsics: None,
             lens_free: matches!(observations.camera, CameraKnowledge::Estimate { .. }),
@@ -158,9 +136,9 @@ impl SessionViews {
             form_information: DMatrix::zeros(0, 0),
             form_gradient: DVector::zeros(0),
             form_freedom: f64::INFINITY,
-            outer,
+            // Numbered as they are: what may be numbered otherwise was renumbered before.
+            target: SeenTarget { outer, turns: Turns::default(), distance_m: 0.0 },
             displacement,
-            distance_m: 0.0,
         };
         if seen.iter().all(|(_, v)| v.corners.is_none()) {
             sight.lens_free = false;
@@ -171,7 +149,7 @@ impl SessionViews {
         }
         let middle = Point3::from(outer.iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 4.0);
         let distances = sight.views.iter().map(|v| (v.camera_from_target * middle).coords.norm());
-        sight.distance_m = median(distances).unwrap_or(0.0);
+        sight.target.distance_m = median(distances).unwrap_or(0.0);
         Ok(sight)
     }
 

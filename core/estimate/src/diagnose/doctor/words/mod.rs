@@ -10,6 +10,8 @@ use super::pairing::Pairing;
 use super::views::SessionViews;
 use super::{Estimate, Hypothesis};
 use crate::diagnose::findings::{Evidence, Finding, FindingCode, Severity, listed};
+use crate::diagnose::hypotheses::pairing::Order;
+use crate::diagnose::hypotheses::steps::Step;
 use crate::handeye::Mode;
 use handeye_wording::text;
 use handeye_wording::{Text, shown};
@@ -139,7 +141,7 @@ fn distances(tried: &Tried) -> (f64, f64) {
 
 fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &[FindingCode]) -> Hypothesis {
     // Where the poses as they are have no solution at all, the board is as good as nowhere.
-    let given_m = gross.as_given.as_ref().map_or(sight.distance_m, |a| a.median_m);
+    let given_m = gross.as_given.as_ref().map_or(sight.target.distance_m, |a| a.median_m);
     let so_m = tried.agreement.median_m;
     let (given_mm, so_mm) = (given_m * 1e3, so_m * 1e3);
     let freedom = 0.5 * (6.0 * gross.views as f64 - 12.0).max(1.0);
@@ -165,7 +167,7 @@ fn gross_hypothesis(sight: &SessionViews, gross: &Gross, tried: &Tried, codes: &
             evidence("target_distance", target_m, "m"),
         ],
         views: match tried.change.pairing {
-            Pairing::Stepped { from, .. } => vec![sight.views[from].name.clone()],
+            Pairing::Stepped(step) => vec![sight.views[step.from].name.clone()],
             _ => Vec::new(),
         },
         significant: false,
@@ -264,17 +266,17 @@ fn pairing_words(sight: &SessionViews, pairing: Pairing) -> Option<Text> {
         Pairing::Shifted(by) => {
             text!("Every image belongs to the robot pose that stands {rows} before its own.", rows = rows(by))
         }
-        Pairing::Stepped { from, before, after } => text!(
+        Pairing::Stepped(Step { from, before, after }) => text!(
             "From view {view} on images and robot poses are out of step by {rows} against the views before it: an image or \
              a pose is missing there, or is there twice.",
             view = &sight.views[from].name,
             rows = rows(after - before)
         ),
-        Pairing::ByNumber => text!(
+        Pairing::Listed(Order::ByNumber) => text!(
             "Images and robot poses were paired in different orders: the images letter by letter (1, 10, 2), the poses by \
              number (1, 2, 10)."
         ),
-        Pairing::Alphabetical => text!(
+        Pairing::Listed(Order::ByLetters) => text!(
             "Images and robot poses were paired in different orders: the images by number (1, 2, 10), the poses letter by \
              letter (1, 10, 2)."
         ),
@@ -320,10 +322,10 @@ pub(super) fn hopeless(sight: &SessionViews, misfit_m: f64) -> Finding {
         "Robot poses and images contradict each other: the views agree on the position of the board within {misfit} mm only, at a distance of {distance} mm. Inverted poses, the other mode, millimetres, quaternion order and rows out of step do not explain \
          it. Check that the poses belong to these images, and the axes and angles that the poses were made from.",
         misfit = format!("{:.0}", misfit_m * 1e3),
-        distance = format!("{:.0}", sight.distance_m * 1e3)
+        distance = format!("{:.0}", sight.target.distance_m * 1e3)
     );
     let finding = Finding::new(FindingCode::InconsistentPoses, Severity::Problem, text);
-    finding.with("misfit", misfit_m * 1e3, "mm").with("distance", sight.distance_m * 1e3, "mm")
+    finding.with("misfit", misfit_m * 1e3, "mm").with("distance", sight.target.distance_m * 1e3, "mm")
 }
 
 /// Noise beyond that of an arm, whatever else was found.

@@ -2,10 +2,8 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::views::SessionViews;
 use crate::handeye::closed_form::{ClosedForm, ClosedFormSolution, ParkMartin, Shah};
 use crate::handeye::{HandEyeError, PosePair, subset};
-use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::statistics::median;
 
 /// Choices of views that are tried besides all of them. With three of ten views wrong a choice of five is clean once in
@@ -29,15 +27,6 @@ pub struct Agreement {
     pub misfit_m: Vec<f64>,
     /// Median over the views.
     pub median_m: f64,
-}
-
-/// Pose pairs of the views with robot poses as given.
-pub(super) fn pairs_of(sight: &SessionViews, poses: &[Pose<Base, Tip>]) -> Vec<PosePair> {
-    let pair = |(view, pose): (&super::views::SessionView, &Pose<Base, Tip>)| PosePair {
-        anchor_from_mount: sight.mode.anchor_from_mount(pose),
-        camera_from_target: Pose::from_isometry(view.camera_from_target),
-    };
-    sight.views.iter().zip(poses).map(pair).collect()
 }
 
 /// The solution with the least median misfit over a fixed set of choices of views. `thorough` tries the choices; without
@@ -93,29 +82,16 @@ fn some_of(count: usize, size: usize, choice: usize) -> Vec<usize> {
 }
 
 fn judged(outer: &[Point3<f64>; 4], pairs: &[PosePair], solution: ClosedFormSolution) -> Agreement {
-    let misfit_m: Vec<f64> = pairs
-        .iter()
-        .map(|pair| {
-            let chain =
-                solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
-            misfit(outer, chain.isometry(), pair.camera_from_target.isometry())
-        })
-        .collect();
+    let of = |pair: &PosePair| misfit(outer, &chain(&solution, pair), pair.camera_from_target.isometry());
+    let misfit_m: Vec<f64> = pairs.iter().map(of).collect();
     let median_m = median(misfit_m.iter().copied()).unwrap_or(f64::INFINITY);
     Agreement { solution, misfit_m, median_m }
 }
 
-/// RMS distance of the target's outer points between where a solution puts them for a robot pose and where they were seen,
-/// metres.
-pub(super) fn misfit_of(
-    sight: &SessionViews,
-    solution: &ClosedFormSolution,
-    base_from_tip: &Pose<Base, Tip>,
-    seen: &Isometry3<f64>,
-) -> f64 {
-    let anchor_from_mount = sight.mode.anchor_from_mount(base_from_tip);
-    let chain = solution.mount_from_camera.inverse() * anchor_from_mount.inverse() * solution.anchor_from_target;
-    misfit(&sight.outer, chain.isometry(), seen)
+/// Where a solution puts the target as the camera sees it.
+pub fn chain(solution: &ClosedFormSolution, pair: &PosePair) -> Isometry3<f64> {
+    let chain = solution.mount_from_camera.inverse() * pair.anchor_from_mount.inverse() * solution.anchor_from_target;
+    *chain.isometry()
 }
 
 /// RMS distance of the target's outer points at two poses, metres.
