@@ -16,7 +16,7 @@ use super::sight::Sight;
 use handeye_estimate::clock_offset::{ClockOffset, ClockOffsetError, clock_offset, pose_at};
 use handeye_estimate::diagnose::hypotheses::agreement::agreement;
 use handeye_estimate::diagnose::hypotheses::rules_out;
-use handeye_estimate::handeye::{Mode, PosePair, subset};
+use handeye_estimate::handeye::{PosePair, subset};
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::progress::CancelToken;
 use handeye_wording::text;

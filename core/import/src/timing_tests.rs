@@ -2,6 +2,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::{Source, Verdict, judge};
+use handeye_estimate::handeye::Mode;
 use handeye_geometry::targets::{Grid, TargetSpec};
 
 const OFFSET_S: f64 = 0.0437;
