@@ -74,8 +74,8 @@ impl Page {
         Ok(page)
     }
 
-    fn say(&mut self, said: &Value) -> anyhow::Result<()> {
-        Ok(self.socket.send(Message::text(said.to_string()))?)
+    fn say(&mut self, reported: &Value) -> anyhow::Result<()> {
+        Ok(self.socket.send(Message::text(reported.to_string()))?)
     }
 
     /// Waits for a frame and says that it is shown; whether it brought a live image.

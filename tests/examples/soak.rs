@@ -53,8 +53,8 @@ impl Page {
         Ok(page)
     }
 
-    fn say(&mut self, said: &Value) -> anyhow::Result<()> {
-        Ok(self.socket.send(Message::text(said.to_string()))?)
+    fn say(&mut self, reported: &Value) -> anyhow::Result<()> {
+        Ok(self.socket.send(Message::text(reported.to_string()))?)
     }
 
     /// Takes in a message.
@@ -67,8 +67,8 @@ impl Page {
                 self.say(&json!({"t": "shown", "number": head["number"]}))
             }
             Message::Text(text) => {
-                let told: Value = serde_json::from_str(&text)?;
-                if let Some(controls) = told["controls"].as_array() {
+                let stated: Value = serde_json::from_str(&text)?;
+                if let Some(controls) = stated["controls"].as_array() {
                     self.controls.clone_from(controls);
                 }
                 Ok(())

@@ -26,7 +26,7 @@ struct DevTools {
     socket: WebSocket<TcpStream>,
     calls: u64,
     /// What the pages said to their consoles.
-    said: Vec<String>,
+    reported: Vec<String>,
 }
 
 /// A page that is open.
@@ -73,7 +73,7 @@ impl Browser {
         let stream = TcpStream::connect(address).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("set");
         let (socket, _) = tungstenite::client(url.as_str(), stream).expect("a connection");
-        let devtools = RefCell::new(DevTools { socket, calls: 0, said: Vec::new() });
+        let devtools = RefCell::new(DevTools { socket, calls: 0, reported: Vec::new() });
         Self { child, devtools, _profile: profile }
     }
 
@@ -210,7 +210,7 @@ impl Browser {
     /// What a page looks like, as PNG.
     ///
     /// # Panics
-    /// When it cannot be said.
+    /// When it cannot be reported.
     pub fn photograph(&self, tab: &Tab) -> Vec<u8> {
         let answer = self.call(Some(tab), "Page.captureScreenshot", &json!({"format": "png"}));
         let base64 = answer["data"].as_str().expect("an image");
@@ -218,8 +218,8 @@ impl Browser {
     }
 
     /// What pages have said to their consoles, warnings and errors among it.
-    pub fn said(&self) -> Vec<String> {
-        self.devtools.borrow().said.clone()
+    pub fn text(&self) -> Vec<String> {
+        self.devtools.borrow().reported.clone()
     }
 
     /// Drops files and folders on a page, as from the file manager.
@@ -264,7 +264,7 @@ impl Browser {
                 return answer["result"].clone();
             }
             if answer["method"] == "Runtime.consoleAPICalled" || answer["method"] == "Runtime.exceptionThrown" {
-                devtools.said.push(answer["params"].to_string());
+                devtools.reported.push(answer["params"].to_string());
             }
         }
     }

@@ -154,8 +154,8 @@ impl StandIn {
                 Ok(_) if Instant::now() < deadline => {}
                 _ => {
                     child.kill().expect("it runs");
-                    let said = child.wait_with_output().expect("its words");
-                    panic!("{served:?}, or too late: {}", String::from_utf8_lossy(&said.stderr));
+                    let reported = child.wait_with_output().expect("its words");
+                    panic!("{served:?}, or too late: {}", String::from_utf8_lossy(&reported.stderr));
                 }
             }
         }

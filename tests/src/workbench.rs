@@ -94,15 +94,15 @@ impl Workbench {
                 return;
             }
             let left = deadline.saturating_duration_since(Instant::now());
-            assert!(!left.is_zero(), "waiting for {what}; the window says:\n{}", self.said());
+            assert!(!left.is_zero(), "waiting for {what}; the window says:\n{}", self.text());
             // Also without a wake: time itself is part of the model.
             let _woken = self.woken.recv_timeout(left.min(Duration::from_millis(100))).is_ok();
         }
     }
 
     /// All messages so far.
-    pub fn said(&self) -> String {
+    pub fn text(&self) -> String {
         let messages = self.app.model().messages.iter();
-        messages.map(|message| message.text.say(Language::English)).collect::<Vec<_>>().join("\n")
+        messages.map(|message| message.text.in_language(Language::English)).collect::<Vec<_>>().join("\n")
     }
 }

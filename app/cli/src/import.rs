@@ -24,7 +24,7 @@ use handeye_workbench::import::understand::{self, NotUnderstood};
 /// At the end of its help.
 pub fn after_help() -> String {
     let formats: Vec<String> =
-        understand::formats_said().iter().map(|line| format!("  {}", line.say(English))).collect();
+        understand::formats_text().iter().map(|line| format!("  {}", line.in_language(English))).collect();
     let formats = formats.join("\n") + "\n";
     format!(
         "What is read:\n{formats}\nKeys of --set:\n{}\n\nExamples, on a recording without a description of what its files mean:\n  \
@@ -56,7 +56,7 @@ pub struct ImportArgs {
     /// Leave the images where they are; the data set names them there.
     #[arg(long, help_heading = heading::OUTPUT)]
     link: bool,
-    /// Stop reading the files after so many seconds. Looking at images takes no part of it: its progress is said, and Ctrl-C
+    /// Stop reading the files after so many seconds. Looking at images takes no part of it: its progress is reported, and Ctrl-C
     /// ends it.
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0, value_parser = seconds, help_heading = heading::LIMITS)]
     time: f64,
@@ -98,14 +98,14 @@ pub fn run(args: &ImportArgs) -> Result<(), Failure> {
     let given =
         args.target.as_deref().map(handeye_workbench::arguments::of_text).transpose().map_err(Failure::unusable)?;
     let recording = Arc::new(open(args, &cancel).map_err(Failure::unusable)?);
-    let mut told = Told { text: found(&recording), notes: Vec::new() };
-    let outcome = import(args, &recording, given, &settings, &mut told, &cancel);
-    // What was found is said in any case: it is what a refusal is about.
+    let mut summary = Summary { text: found(&recording), notes: Vec::new() };
+    let outcome = import(args, &recording, given, &settings, &mut summary, &cancel);
+    // What was found is reported in any case: it is what a refusal is about.
     let findings = match &outcome {
         Ok(done) => done.findings.clone(),
         Err(refused) => refused.findings.clone().unwrap_or(serde_json::Value::Null),
     };
-    told.publish(args, &recording, &findings)?;
+    summary.publish(args, &recording, &findings)?;
     outcome.map(|_| ()).map_err(|refused| refused.failure)
 }
 
@@ -137,13 +137,13 @@ impl From<Failure> for Refused {
     }
 }
 
-/// What is said on standard output.
-struct Told {
+/// What is reported on standard output.
+struct Summary {
     text: String,
     notes: Vec<String>,
 }
 
-impl Told {
+impl Summary {
     fn note(&mut self, note: impl std::fmt::Display) {
         let note = note.to_string();
         self.line(format_args!("note: {note}"));
@@ -177,7 +177,7 @@ fn import(
     recording: &Arc<Recording>,
     given: Option<TargetSpec>,
     settings: &Settings,
-    told: &mut Told,
+    summary: &mut Summary,
     cancel: &CancelToken,
 ) -> Result<Done, Refused> {
     let refused = |error: NotUnderstood| match error {
@@ -198,21 +198,21 @@ fn import(
     let looked = understand::look(recording, given, settings, &looked_at, cancel).map_err(refused)?;
     for (stream, seen, images) in &looked.seen {
         let target = looked.target.as_ref().map(|(target, _)| target.to_string()).unwrap_or_default();
-        told.line(format_args!("{target} found in {seen} of {images} images {stream}"));
+        summary.line(format_args!("{target} found in {seen} of {images} images {stream}"));
     }
-    looked.notes.iter().for_each(|note| told.note(note.say(English)));
+    looked.notes.iter().for_each(|note| summary.note(note.in_language(English)));
     let recording = &*looked.recording;
     for clocks in &recording.clocks {
-        told.line(format_args!("Clocks: {}", clocks.said().say(English)));
+        summary.line(format_args!("Clocks: {}", clocks.text().in_language(English)));
     }
     let judgement = looked.judge(settings, cancel).map_err(refused)?;
     let is_open_in_mode = settings.mode.is_none() && judgement.is_open_in_mode_alone();
-    told.text.push_str(&listed(recording, &judgement, if is_open_in_mode { 2 } else { SHOWN }));
+    summary.text.push_str(&listed(recording, &judgement, if is_open_in_mode { 2 } else { SHOWN }));
     if judgement.untried + judgement.sources_untried > 0 {
-        told.note(understand::untried_said(&judgement).say(English));
+        summary.note(understand::untried_text(&judgement).in_language(English));
     }
     if is_open_in_mode && args.out.is_none() {
-        told.line(asked_for_mode(args));
+        summary.line(asked_for_mode(args));
     }
     let mut findings = as_json(recording, &judgement);
     let refuse = |failure: Failure, findings: serde_json::Value| Refused { failure, findings: Some(findings) };
@@ -244,9 +244,9 @@ fn import(
     };
     write::write(&plan, folder, progress).map_err(Failure::failed)?;
     for line in &plan.left_out {
-        told.note(format_args!("not written: {line}"));
+        summary.note(format_args!("not written: {line}"));
     }
-    told.line(format_args!(
+    summary.line(format_args!(
         "Wrote {} to {}. Solve it with: handeye calibrate {}",
         out::counted(plan.views, "view", "views"),
         folder.display(),
@@ -296,10 +296,10 @@ fn looked_at(done: usize, of: usize) {
 fn found(recording: &Recording) -> String {
     let mut text = String::from("Found:\n");
     for belief in &recording.beliefs {
-        text.extend(["  ", &belief.say(English), "\n"]);
+        text.extend(["  ", &belief.in_language(English), "\n"]);
     }
     for warning in &recording.warnings {
-        text.extend(["  note: ", &warning.say(English), "\n"]);
+        text.extend(["  note: ", &warning.in_language(English), "\n"]);
     }
     text
 }
@@ -420,8 +420,8 @@ fn quoted(word: &str) -> String {
     }
 }
 
-fn in_english(said: &[Text]) -> Vec<String> {
-    said.iter().map(|text| text.say(English)).collect()
+fn in_english(reported: &[Text]) -> Vec<String> {
+    reported.iter().map(|text| text.in_language(English)).collect()
 }
 
 fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
@@ -437,7 +437,7 @@ fn as_json(recording: &Recording, judgement: &Judgement) -> serde_json::Value {
                 "camera_mm": fit.camera_at_m * 1e3,
                 "target_mm": fit.target_at_m * 1e3,
                 "disagreeing": fit.disagreeing.iter().map(|(sample, misfit_m)| {
-                    json!({ "pose": samples[*sample].place.say(English), "mm": misfit_m * 1e3 })
+                    json!({ "pose": samples[*sample].place.in_language(English), "mm": misfit_m * 1e3 })
                 }).collect::<Vec<_>>(),
             })
         });

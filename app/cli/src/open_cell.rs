@@ -17,7 +17,7 @@ use handeye_link::{
 use handeye_plan::Surroundings;
 use handeye_plan::guided::choose::Robot;
 use handeye_server::{CellConfig, CellServer};
-use handeye_workbench::model::FollowWish;
+use handeye_workbench::model::FollowRequest;
 use handeye_workbench::text::Language;
 use handeye_workbench::track::follow::follow;
 use handeye_workbench::worker::FollowLine;
@@ -49,7 +49,7 @@ pub struct OpenCell {
 
 /// For a failure of a command.
 pub fn port_failure(error: &PortError) -> Failure {
-    Failure::failed(anyhow::anyhow!("{}", error.why().say(Language::English)))
+    Failure::failed(anyhow::anyhow!("{}", error.why().in_language(Language::English)))
 }
 
 impl OpenCell {
@@ -105,7 +105,7 @@ impl OpenCell {
     pub fn follow(
         &mut self,
         line: &FollowLine,
-        wish: FollowWish,
+        requested: FollowRequest,
         cancel: &CancelToken,
     ) -> Result<Result<FollowEnd, MotionOutcome>, Failure> {
         let mut makes_room = || {
@@ -114,7 +114,7 @@ impl OpenCell {
                  view from there"
             );
         };
-        let followed = follow(self.motion.as_mut(), line, wish, self.speed, cancel, &mut makes_room);
+        let followed = follow(self.motion.as_mut(), line, requested, self.speed, cancel, &mut makes_room);
         followed.map_err(|error| port_failure(&error))
     }
 
@@ -149,7 +149,7 @@ impl OpenCell {
     /// When the connection is lost.
     pub fn robot(&mut self) -> Result<Result<Robot, Failure>, Failure> {
         let robot = self.motion.robot(self.speed).map_err(|error| port_failure(&error))?;
-        Ok(robot.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.say(Language::English)))))
+        Ok(robot.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.in_language(Language::English)))))
     }
 
     /// Views of a board, from where the arm stands; or why there are none.
@@ -164,7 +164,7 @@ impl OpenCell {
     ) -> Result<Result<Vec<JointValues>, Failure>, Failure> {
         let request = ViewsRequest { board: *board, taken: Vec::new(), count, seed };
         let views = self.motion.views(&request).map_err(|error| port_failure(&error))?;
-        Ok(views.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.say(Language::English)))))
+        Ok(views.map_err(|why| Failure::failed(anyhow::anyhow!("{}", why.in_language(Language::English)))))
     }
 
     /// Where a simulated cell has its board: by its truth where it publishes that, and else by its scene; `None` where neither
@@ -198,7 +198,7 @@ impl OpenCell {
         self.motion.keep_out(keep_out).map_err(|why| {
             Failure::failed(anyhow::anyhow!(
                 "--keep-out needs an arm whose chain is known, to know what it would touch (docs/reference/arms.md): {}",
-                why.say(Language::English)
+                why.in_language(Language::English)
             ))
         })?;
         Ok(())
@@ -262,8 +262,8 @@ impl OpenCell {
         let ended = match &outcome {
             Ok(MotionOutcome::Arrived) => "arrived".to_owned(),
             Ok(MotionOutcome::Stopped) => "stopped".to_owned(),
-            Ok(outcome) => outcome.why().map_or_else(String::new, |why| why.say(Language::English)),
-            Err(error) => error.why().say(Language::English),
+            Ok(outcome) => outcome.why().map_or_else(String::new, |why| why.in_language(Language::English)),
+            Err(error) => error.why().in_language(Language::English),
         };
         self.log(&format!("motion {number}: {ended}"));
         self.tell_what_is_heard();
@@ -329,14 +329,14 @@ impl OpenCell {
         let left = self.control.stop().and_then(|()| self.motion.step_by_step(false));
         let ended = left.and_then(|()| if ends_simulation { self.control.stop_simulation() } else { Ok(()) });
         if let Err(error) = ended {
-            tracing::warn!("the simulation could not be stopped: {}", error.why().say(Language::English));
+            tracing::warn!("the simulation could not be stopped: {}", error.why().in_language(Language::English));
         }
     }
 
     /// As STOP in the window: what the robot's states say of it counts.
     fn stop_and_watch(&mut self) {
         if let Err(error) = self.control.stop() {
-            let why = error.why().say(Language::English);
+            let why = error.why().in_language(Language::English);
             tracing::error!("the robot may still move, the stop failed: {why}. Use its own emergency stop");
             return;
         }
@@ -359,7 +359,7 @@ impl OpenCell {
             );
         };
         let kind = |joint: usize| self.facts.joints.get(joint).map(|joint| joint.kind);
-        let moved = moved_text(&moved, kind).say(Language::English);
+        let moved = moved_text(&moved, kind).in_language(Language::English);
         tracing::error!("the robot was told to stop and still moves: {moved} since. Use its own emergency stop");
     }
 }

@@ -101,7 +101,7 @@ pub fn finished(written: io::Result<()>, place: impl Display) -> Result<(), Fail
     }
 }
 
-/// Writes one line for a person to standard error. That this fails cannot be said anywhere.
+/// Writes one line for a person to standard error. That this fails cannot be reported anywhere.
 pub fn note(line: impl Display) {
     let _said = Log { is_coloured: false }.write_all(format!("{line}\n").as_bytes()).is_ok();
 }

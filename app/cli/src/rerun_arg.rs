@@ -170,17 +170,17 @@ pub fn finish(mut recorder: Recorder, cancel: &CancelToken) -> Result<(), Failur
         ViewerState::Failed(why) => failed = Some(why),
         ViewerState::Closed | ViewerState::Opening | ViewerState::Connected { .. } => {}
     }
-    let mut said = Vec::new();
+    let mut reported = Vec::new();
     let deadline = if failed.is_some() { Duration::from_secs(2) } else { DEADLINE };
-    recorder.drain(&mut |event| said.push(event));
+    recorder.drain(&mut |event| reported.push(event));
     let complete = recorder.finish(deadline);
-    for event in said {
+    for event in reported {
         if let handeye_workbench::command::Event::Messages(messages::Event::Notice { text, .. }) = event {
-            tracing::warn!("{}", text.say(Language::English));
+            tracing::warn!("{}", text.in_language(Language::English));
         }
     }
     match failed {
-        Some(why) => Err(Failure::failed(anyhow!("{}", why.say(Language::English)))),
+        Some(why) => Err(Failure::failed(anyhow!("{}", why.in_language(Language::English)))),
         None if complete => Ok(()),
         None => Err(Failure::failed(anyhow!(
             "the recording for Rerun was not written within {} s; the result is complete",

@@ -207,7 +207,7 @@ pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
     SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, truth: None }
 }
 
-/// Where there is no answer the data may be at fault: how the poses were written is said at once, the rest by the doctor.
+/// Where there is no answer the data may be at fault: how the poses were written is reported at once, the rest by the doctor.
 pub fn unsolved(error: CalibrateError, folder: &Path, observations: &Observations, cancel: &CancelToken) -> Failure {
     match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),

@@ -148,8 +148,8 @@ impl Way {
             if began.elapsed() > PATIENCE {
                 let language = handeye_workbench::text::Language::English;
                 let messages = self.drawn.app().model().messages.iter();
-                let said: Vec<String> = messages.map(|message| message.text.say(language)).collect();
-                bail!("waiting for {what}; the window says:\n{}", said.join("\n"));
+                let reported: Vec<String> = messages.map(|message| message.text.in_language(language)).collect();
+                bail!("waiting for {what}; the window says:\n{}", reported.join("\n"));
             }
             self.drawn.draw();
         }

@@ -31,22 +31,22 @@ fn connect(door: &Door) -> Socket {
 
 /// What comes until there is this in it, or until the end.
 fn read_until(socket: &mut Socket, wanted: &str) -> String {
-    let mut said = Vec::new();
+    let mut reported = Vec::new();
     let mut piece = [0; 4096];
     loop {
         match socket.read(&mut piece) {
-            Ok(count) if count > 0 => said.extend_from_slice(&piece[..count]),
+            Ok(count) if count > 0 => reported.extend_from_slice(&piece[..count]),
             Ok(_) => break,
             Err(error) => match error.kind() {
                 ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => break,
-                _ => panic!("{error}: {}", String::from_utf8_lossy(&said)),
+                _ => panic!("{error}: {}", String::from_utf8_lossy(&reported)),
             },
         }
-        if String::from_utf8_lossy(&said).contains(wanted) {
+        if String::from_utf8_lossy(&reported).contains(wanted) {
             break;
         }
     }
-    String::from_utf8_lossy(&said).into_owned()
+    String::from_utf8_lossy(&reported).into_owned()
 }
 
 fn ask(door: &Door, request: &str) -> String {

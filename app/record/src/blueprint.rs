@@ -110,7 +110,7 @@ fn live_image(name: &str, Arranged { is_beside, .. }: Arranged) -> ContainerLike
     Spatial2DView::new(name).with_origin(lens(mode)).with_contents(["+ $origin/**".to_owned(), no_depth]).into()
 }
 
-/// What the robot does, where that is known, and what was said.
+/// What the robot does, where that is known, and what was reported.
 fn joints_and_log(Arranged { has_joints, .. }: Arranged) -> impl Iterator<Item = ContainerLike> {
     let joints = has_joints.then(|| plot("Joints", paths::PLOT_JOINTS));
     joints.into_iter().chain([log()])

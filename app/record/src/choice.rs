@@ -22,7 +22,7 @@ pub enum RerunChoice {
 }
 
 /// What `--rerun` was given cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 pub enum ChoiceError {
     /// No such word.
     #[error(
@@ -90,8 +90,8 @@ mod tests {
             ("connect", "rerun+http://127.0.0.1:9876/proxy"),
             ("connect 127.0.0.1:9876", "rerun+http://127.0.0.1:9876/proxy"),
         ] {
-            let said = RerunChoice::parse(words).expect_err(words).to_string();
-            assert!(said.contains(advice), "{words:?}: {said}");
+            let reported = RerunChoice::parse(words).expect_err(words).to_string();
+            assert!(reported.contains(advice), "{words:?}: {reported}");
         }
     }
 }

@@ -10,7 +10,7 @@ use handeye_workbench::recording::Entry;
 const MAX_SOLVED: usize = 64;
 
 /// Messages that are kept.
-const MAX_SAID: usize = 1000;
+const MAX_MESSAGE: usize = 1000;
 
 /// States of the robot that are kept as its trail.
 const MAX_TRAIL: usize = 2048;
@@ -80,7 +80,7 @@ impl Lasting {
         }
         let limit = match &entry {
             Entry::Solved(_) => MAX_SOLVED,
-            Entry::Said { .. } => MAX_SAID,
+            Entry::Message { .. } => MAX_MESSAGE,
             _ => usize::MAX,
         };
         self.make_room(&entry, limit);

@@ -7,8 +7,8 @@ use super::*;
 use handeye_workbench::model::{Observed, Severity, Step};
 use handeye_workbench::session::start;
 
-fn said(words: &str) -> Entry {
-    Entry::Said { severity: Severity::Info, words: words.to_owned() }
+fn reported(words: &str) -> Entry {
+    Entry::Message { severity: Severity::Info, words: words.to_owned() }
 }
 
 fn document(captures: &[u32]) -> Entry {
@@ -33,7 +33,7 @@ fn words(lasting: &Lasting) -> Vec<String> {
     let word = |item: &Item| match item {
         Item::Begin(recording) => format!("begin {}", recording.id),
         Item::Name(name) => format!("name {name}"),
-        Item::Entry(Entry::Said { words, .. }) => words.clone(),
+        Item::Entry(Entry::Message { words, .. }) => words.clone(),
         Item::Entry(Entry::Document { document, .. }) => format!("{} captures", document.captures.len()),
         Item::Entry(Entry::Observed { id, observed }) => format!("{id:?} {}", observed.image_size.0),
         Item::Entry(Entry::Step(step)) => format!("{step:?}"),
@@ -45,7 +45,7 @@ fn words(lasting: &Lasting) -> Vec<String> {
 #[test]
 fn a_newer_document_takes_the_place_of_the_older_one_and_its_deleted_captures_go() {
     let mut lasting = Lasting::default();
-    for entry in [document(&[1, 2]), said("a"), observed(1, 10), observed(2, 20), observed(1, 11), document(&[1])] {
+    for entry in [document(&[1, 2]), reported("a"), observed(1, 10), observed(2, 20), observed(1, 11), document(&[1])] {
         lasting.put(entry);
     }
     assert_eq!(words(&lasting), ["1 captures", "a", "CaptureId(1) 11"]);
@@ -65,7 +65,7 @@ fn nothing_of_an_earlier_recording_is_replaced_by_a_later_one() {
 #[test]
 fn another_recording_begins_with_what_is_true_of_every_one() {
     let mut lasting = Lasting::default();
-    for entry in [document(&[1]), Entry::Step(Step::Solve), said("a")] {
+    for entry in [document(&[1]), Entry::Step(Step::Solve), reported("a")] {
         lasting.put(entry);
     }
     lasting.begin_another();
@@ -76,11 +76,11 @@ fn another_recording_begins_with_what_is_true_of_every_one() {
 fn a_long_day_of_messages_stays_a_short_list_that_ends_with_the_newest() {
     let mut lasting = Lasting::default();
     lasting.put(document(&[]));
-    for number in 0..MAX_SAID + 7 {
-        lasting.put(said(&number.to_string()));
+    for number in 0..MAX_MESSAGE + 7 {
+        lasting.put(reported(&number.to_string()));
     }
     let words = words(&lasting);
-    assert_eq!(words.len(), MAX_SAID + 1);
+    assert_eq!(words.len(), MAX_MESSAGE + 1);
     assert_eq!((words[0].as_str(), words[1].as_str()), ("0 captures", "7"));
 }
 

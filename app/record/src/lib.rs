@@ -62,7 +62,7 @@ pub use choice::{ChoiceError, RerunChoice};
 pub use pace::Pace;
 pub use recorder::{Recorder, RecorderOptions, WebViewer, record};
 pub use serving::Relay;
-pub use viewer::ViewerWish;
+pub use viewer::ViewerRequest;
 
 /// Under which viewers keep layouts and recordings of this program.
 const APPLICATION_ID: &str = "handeye-workbench";

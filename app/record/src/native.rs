@@ -40,27 +40,27 @@ fn find_on(path: &OsStr) -> Result<PathBuf, Text> {
             version = wanted
         ));
     };
-    let said = version(&program).map_err(|error| {
+    let reported = version(&program).map_err(|error| {
         text!("The native Rerun viewer {program} does not start: {error}", program = program.display(), error = error)
     })?;
     // Recordings are understood across patches of the same minor version.
-    if parse_version(&said)
+    if parse_version(&reported)
         .is_some_and(|[major, minor, _]| [major, minor] == [u32::from(ours.major), u32::from(ours.minor)])
     {
         return Ok(program);
     }
     Err(text!(
-        "The native Rerun viewer {program} has another version ({said}): `pip install rerun-sdk=={version}` brings the \
+        "The native Rerun viewer {program} has another version ({reported}): `pip install rerun-sdk=={version}` brings the \
          right one",
         program = program.display(),
-        said = said.lines().next().unwrap_or_default().chars().take(40).collect::<String>(),
+        reported = reported.lines().next().unwrap_or_default().chars().take(40).collect::<String>(),
         version = wanted
     ))
 }
 
 /// `rerun-cli 0.36.3 (…` has 0, 36, 3.
-fn parse_version(said: &str) -> Option<[u32; 3]> {
-    let numbers = said.split_whitespace().nth(1)?.split(['-', '+']).next()?;
+fn parse_version(reported: &str) -> Option<[u32; 3]> {
+    let numbers = reported.split_whitespace().nth(1)?.split(['-', '+']).next()?;
     let mut numbers = numbers.split('.').map(str::parse);
     Some([numbers.next()?.ok()?, numbers.next()?.ok()?, numbers.next()?.ok()?])
 }
@@ -73,11 +73,11 @@ fn version(program: &Path) -> io::Result<String> {
         child.wait()?;
         return Err(io::Error::new(io::ErrorKind::TimedOut, "it does not say its version"));
     }
-    let mut said = String::new();
+    let mut reported = String::new();
     if let Some(stdout) = &mut stdout {
-        stdout.take(4096).read_to_string(&mut said)?;
+        stdout.take(4096).read_to_string(&mut reported)?;
     }
-    Ok(said)
+    Ok(reported)
 }
 
 /// Starts the viewer; it reads from this address.
@@ -124,11 +124,11 @@ mod tests {
     use super::*;
     use handeye_workbench::text::Language;
 
-    fn viewer_that_says(said: &str) -> tempfile::TempDir {
+    fn viewer_that_says(reported: &str) -> tempfile::TempDir {
         use std::os::unix::fs::PermissionsExt as _;
         let folder = tempfile::tempdir().expect("a folder");
         let program = folder.path().join(PROGRAM);
-        std::fs::write(&program, format!("#!/bin/sh\necho '{said}'\n")).expect("written");
+        std::fs::write(&program, format!("#!/bin/sh\necho '{reported}'\n")).expect("written");
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("allowed");
         folder
     }
@@ -140,17 +140,17 @@ mod tests {
         let folder = viewer_that_says(&same);
         assert_eq!(find_on(folder.path().as_os_str()), Ok(folder.path().join(PROGRAM)));
 
-        for said in [format!("rerun-cli {}.{}.0", ours.major, ours.minor + 1), "something else".to_owned()] {
-            let folder = viewer_that_says(&said);
-            let why = find_on(folder.path().as_os_str()).expect_err(&said).say(Language::English);
-            assert!(why.contains(&said) && why.contains("pip install rerun-sdk=="), "{why}");
+        for reported in [format!("rerun-cli {}.{}.0", ours.major, ours.minor + 1), "something else".to_owned()] {
+            let folder = viewer_that_says(&reported);
+            let why = find_on(folder.path().as_os_str()).expect_err(&reported).in_language(Language::English);
+            assert!(why.contains(&reported) && why.contains("pip install rerun-sdk=="), "{why}");
         }
     }
 
     #[test]
     fn a_missing_viewer_is_said_with_the_way_to_get_it() {
         let folder = tempfile::tempdir().expect("a folder");
-        let why = find_on(folder.path().as_os_str()).expect_err("none").say(Language::English);
+        let why = find_on(folder.path().as_os_str()).expect_err("none").in_language(Language::English);
         assert!(why.contains("pip install rerun-sdk=="), "{why}");
     }
 }

@@ -42,8 +42,8 @@ fn image(number: u64) -> Entry {
     Entry::Image { info: Box::new(info), images: Arc::new(images) }
 }
 
-fn said(words: &str) -> Entry {
-    Entry::Said { severity: Severity::Info, words: words.to_owned() }
+fn reported(words: &str) -> Entry {
+    Entry::Message { severity: Severity::Info, words: words.to_owned() }
 }
 
 fn number(next: Next) -> u64 {
@@ -61,10 +61,10 @@ fn a_writer_that_never_writes_leaves_a_short_queue_with_everything_that_lasts() 
         queue.put(robot(round as f64));
         queue.put(Entry::Selected(Vec::new()));
     }
-    queue.put(said("the last words"));
+    queue.put(reported("the last words"));
     assert_eq!(queue.len(), 4, "an image, a state, a selection and a message");
     assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Selected(_)))));
-    assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Said { .. }))));
+    assert!(matches!(queue.next(SOON), Next::Lasting(Item::Entry(Entry::Message { .. }))));
     assert_eq!(number(queue.next(SOON)), 1999, "the newest image");
 }
 
@@ -110,12 +110,12 @@ fn images_that_a_slow_writer_did_not_take_are_counted() {
 fn what_lasts_goes_before_what_is_live_and_a_waiting_writer_is_woken() {
     let queue = Arc::new(Queue::new(&rates(Rate::newest_every(Duration::ZERO))));
     queue.put(image(1));
-    queue.put(said("hello"));
+    queue.put(reported("hello"));
     assert!(matches!(queue.next(SOON), Next::Lasting(_)));
     assert_eq!(number(queue.next(SOON)), 1);
     let waiting = Arc::clone(&queue);
     let writer = std::thread::spawn(move || matches!(waiting.next(SOON), Next::Lasting(_)));
-    queue.put(said("again"));
+    queue.put(reported("again"));
     assert!(writer.join().expect("no panic"));
 }
 
@@ -129,7 +129,7 @@ fn where_nothing_may_be_left_out_a_slow_writer_gets_every_entry_in_its_order() {
             loop {
                 match queue.next(Duration::from_mins(1)) {
                     Next::Live(Entry::Robot { sim_time_s, .. }) => taken.push(sim_time_s),
-                    Next::Lasting(Item::Entry(Entry::Said { words, .. })) => {
+                    Next::Lasting(Item::Entry(Entry::Message { words, .. })) => {
                         taken.push(words.parse().expect("a number"));
                     }
                     Next::End => return taken,
@@ -140,7 +140,7 @@ fn where_nothing_may_be_left_out_a_slow_writer_gets_every_entry_in_its_order() {
         }
     });
     for number in 0..200 {
-        queue.put(if number % 2 == 0 { robot(f64::from(number)) } else { said(&number.to_string()) });
+        queue.put(if number % 2 == 0 { robot(f64::from(number)) } else { reported(&number.to_string()) });
     }
     queue.end();
     let taken: Vec<f64> = writer.join().expect("no panic");

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::pace::Pace;
 use super::reports::Reports;
 use super::shared::Shared;
-use super::{Relay, RerunChoice, ViewerWish, viewer};
+use super::{Relay, RerunChoice, ViewerRequest, viewer};
 use handeye_workbench::app::App;
 use handeye_workbench::command::Event;
 use handeye_workbench::model::RerunState;
@@ -33,7 +33,7 @@ pub struct RecorderOptions {
     pub choice: RerunChoice,
     /// How much.
     pub pace: Pace,
-    /// Whether a file is written beside the session when nothing else is said.
+    /// Whether a file is written beside the session when nothing else is reported.
     pub beside_session: bool,
     /// Where the web viewer is shown.
     pub web: WebViewer,
@@ -80,9 +80,9 @@ impl Recorder {
         let recorder = Self { shared: Some(Arc::clone(&shared)) };
         match choice {
             RerunChoice::Save(path) => shared.save_to(path)?,
-            RerunChoice::Spawn => recorder.open(ViewerWish::Native),
-            RerunChoice::Web => recorder.open(ViewerWish::Web),
-            RerunChoice::Connect(url) => recorder.open(ViewerWish::Connect(url)),
+            RerunChoice::Spawn => recorder.open(ViewerRequest::Native),
+            RerunChoice::Web => recorder.open(ViewerRequest::Web),
+            RerunChoice::Connect(url) => recorder.open(ViewerRequest::Connect(url)),
             RerunChoice::Record | RerunChoice::Off => {}
         }
         Ok(recorder)
@@ -94,9 +94,9 @@ impl Recorder {
     }
 
     /// Opens a viewer; how that goes is reported.
-    pub fn open(&self, wish: ViewerWish) {
+    pub fn open(&self, request: ViewerRequest) {
         if let Some(shared) = &self.shared {
-            viewer::open(shared, wish);
+            viewer::open(shared, request);
         }
     }
 
@@ -114,7 +114,7 @@ impl Recording for Recorder {
     }
 
     fn open_viewer(&self) {
-        self.open(ViewerWish::Best);
+        self.open(ViewerRequest::Best);
     }
 
     fn drain(&self, absorb: &mut dyn FnMut(Event)) {

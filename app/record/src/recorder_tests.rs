@@ -32,8 +32,8 @@ fn document(folder: &Path) -> Entry {
     Entry::Document { folder: Some(folder.to_path_buf()), document: Arc::new(document) }
 }
 
-fn said(words: &str) -> Entry {
-    Entry::Said { severity: Severity::Info, words: words.to_owned() }
+fn reported(words: &str) -> Entry {
+    Entry::Message { severity: Severity::Info, words: words.to_owned() }
 }
 
 fn robot(sim_time_s: f64) -> Entry {
@@ -60,8 +60,8 @@ fn entities(file: &Path) -> std::collections::BTreeMap<String, u64> {
 fn a_recording_that_is_off_takes_entries_and_does_nothing() {
     let recorder = start(RerunChoice::Off);
     assert!(!recorder.is_on());
-    recorder.note(said("a"));
-    recorder.open(ViewerWish::Best);
+    recorder.note(reported("a"));
+    recorder.open(ViewerRequest::Best);
     assert_eq!(recorder.state(), RerunState::default());
 }
 
@@ -87,9 +87,9 @@ fn a_long_recording_holds_nothing_back_until_it_is_closed() {
 fn every_session_gets_a_file_of_its_own_with_what_was_before_its_first_capture() {
     let (one, two) = (tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder"));
     let mut recorder = start(RerunChoice::Record);
-    recorder.note(said("before there is a session"));
+    recorder.note(reported("before there is a session"));
     recorder.note(document(one.path()));
-    recorder.note(said("in the first"));
+    recorder.note(reported("in the first"));
     recorder.note(document(two.path()));
     recorder.note(document(one.path()));
     assert!(recorder.finish(SOON));
@@ -107,14 +107,14 @@ fn a_folder_that_cannot_be_written_is_said_once_and_the_work_goes_on() {
     let mut recorder = start(RerunChoice::Record);
     recorder.note(document(&folder.path().join("none")));
     for number in 0..10 {
-        recorder.note(said(&number.to_string()));
+        recorder.note(reported(&number.to_string()));
     }
     let shared = Arc::clone(recorder.shared.as_ref().expect("it is on"));
     assert!(recorder.finish(SOON));
     let mut words = Vec::new();
     shared.drain(&mut |event| {
         if let Event::Messages(handeye_workbench::messages::Event::Notice { text, .. }) = event {
-            words.push(text.say(Language::English));
+            words.push(text.in_language(Language::English));
         }
     });
     assert_eq!(words.len(), 1, "{words:?}");
@@ -163,7 +163,7 @@ fn a_viewer_that_comes_late_gets_what_lasts_and_the_trail_of_the_robot() {
     for second in 0..10 {
         recorder.note(robot(f64::from(second)));
     }
-    recorder.note(said("early"));
+    recorder.note(reported("early"));
     recorder.note(document(folder.path()));
     let shared = Arc::clone(recorder.shared.as_ref().expect("it is on"));
     let (sent, messages) = crossbeam_channel::unbounded();
@@ -204,7 +204,7 @@ fn the_web_viewer_and_its_server_are_there_for_this_machine_only() {
         assert!(address.starts_with("127.0.0.1:"), "{address}");
         assert!(std::net::TcpStream::connect(address).is_ok(), "{address}");
     }
-    recorder.open(ViewerWish::Web);
+    recorder.open(ViewerRequest::Web);
     while recorder.state().viewer == ViewerState::Opening {
         std::thread::yield_now();
     }
@@ -229,7 +229,7 @@ mod slow {
         for round in 0..20_000 {
             let call = Instant::now();
             recorder.note(robot(f64::from(round) * 0.01));
-            recorder.note(said("hello"));
+            recorder.note(reported("hello"));
             longest = longest.max(call.elapsed());
         }
         // 40,000 entries; one that waited for the viewer would wait for ever.

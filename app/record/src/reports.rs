@@ -23,7 +23,7 @@ struct Inner {
     state: RerunState,
     events: Vec<Event>,
     /// The state that the window knows.
-    told: RerunState,
+    reported: RerunState,
 }
 
 impl Reports {
@@ -89,9 +89,9 @@ impl Reports {
     pub fn drain(&self, left_out: u64, absorb: &mut dyn FnMut(Event)) {
         let now = self.state(left_out);
         let mut inner = self.inner();
-        let is_news = inner.told != now;
+        let is_news = inner.reported != now;
         if is_news {
-            inner.told.clone_from(&now);
+            inner.reported.clone_from(&now);
         }
         let events = std::mem::take(&mut inner.events);
         drop(inner);

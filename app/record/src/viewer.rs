@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// Which viewer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ViewerWish {
+pub enum ViewerRequest {
     /// The native one, or the web viewer where there is none.
     Best,
     /// The native one.
@@ -41,7 +41,7 @@ pub enum ViewerWish {
 }
 
 /// Opens a viewer unless one is being opened.
-pub(super) fn open(shared: &Arc<Shared>, wish: ViewerWish) {
+pub(super) fn open(shared: &Arc<Shared>, request: ViewerRequest) {
     if let Err(state) = shared.reports.begin_opening() {
         let text = match state {
             ViewerState::Native => text!("The Rerun viewer is open already"),
@@ -52,16 +52,16 @@ pub(super) fn open(shared: &Arc<Shared>, wish: ViewerWish) {
         return;
     }
     let work = Arc::clone(shared);
-    let wish = if matches!(shared.web, WebViewer::Relayed(_)) { ViewerWish::Web } else { wish };
+    let request = if matches!(shared.web, WebViewer::Relayed(_)) { ViewerRequest::Web } else { request };
     let started = Builder::new().name("rerun-opener".to_owned()).spawn(move || {
-        let opened = match wish {
-            ViewerWish::Best => work.native().or_else(|why| {
-                tracing::info!("{}", why.say(handeye_workbench::text::Language::English));
+        let opened = match request {
+            ViewerRequest::Best => work.native().or_else(|why| {
+                tracing::info!("{}", why.in_language(handeye_workbench::text::Language::English));
                 work.web()
             }),
-            ViewerWish::Native => work.native(),
-            ViewerWish::Web => work.web(),
-            ViewerWish::Connect(url) => work.connect(&url),
+            ViewerRequest::Native => work.native(),
+            ViewerRequest::Web => work.web(),
+            ViewerRequest::Connect(url) => work.connect(&url),
         };
         if let Err(why) = opened {
             work.failed(why);
@@ -163,7 +163,7 @@ impl Shared {
         let shared = SharedSink(Arc::clone(&sink) as Arc<dyn rerun::sink::LogSink>);
         self.write_to_viewers(Target::Viewers { lasting: shared.clone(), live: shared });
         let began = std::time::Instant::now();
-        let mut told = ViewerState::Opening;
+        let mut reported = ViewerState::Opening;
         while !self.has_ended() {
             let now = match sink.status() {
                 GrpcSinkConnectionState::Connecting { .. } if began.elapsed() < CONNECT => ViewerState::Opening,
@@ -177,8 +177,8 @@ impl Shared {
                     return Err(text!("The viewer at {url} has gone", url = url));
                 }
             };
-            if now != told {
-                told.clone_from(&now);
+            if now != reported {
+                reported.clone_from(&now);
                 self.reports.set_viewer(now);
             }
             std::thread::sleep(LOOK);

@@ -8,7 +8,7 @@ use egui::{Event, OutputCommand, Pos2, RawInput, Rect, Vec2, ViewportCommand, Vi
 
 use super::chunks;
 use super::frame::{Frame, Typing, cursor_name};
-use super::hub::{Errand, Hub, Words};
+use super::hub::{Hub, PageRequest, Words};
 use super::input::{Held, Screen, lets_go};
 use super::memory::Memory;
 use super::reading;
@@ -61,7 +61,7 @@ pub struct Host {
     collected: Instant,
     remembered: Instant,
     /// When screen readers were told what there is.
-    told: Instant,
+    reported: Instant,
     screen: Option<Screen>,
     held: Held,
     /// Something is held at a page that was not heard for too long.
@@ -120,7 +120,7 @@ impl Host {
             drawn: None,
             collected: now,
             remembered: now,
-            told: now,
+            reported: now,
             screen: None,
             held: Held::default(),
             is_silent: false,
@@ -151,7 +151,7 @@ impl Host {
         self.window.app_mut().begin_to_leave();
         let written = self.memory.keep(self.window.remembered()).map(|write| write.perform());
         if let Some(Err(warning)) = written {
-            tracing::warn!("{}", warning.0.say(Language::English));
+            tracing::warn!("{}", warning.0.in_language(Language::English));
         }
     }
 
@@ -277,9 +277,9 @@ impl Host {
         self.textures.change(&mut output.textures_delta);
         let platform = output.platform_output;
         if is_read && let Some(update) = &platform.accesskit_update {
-            let next = self.told + TELL;
+            let next = self.reported + TELL;
             if Instant::now() >= next {
-                self.told = Instant::now();
+                self.reported = Instant::now();
                 self.hub.tell(reading::controls(update));
             } else {
                 sooner(&self.due, next.saturating_duration_since(Instant::now()));
@@ -287,8 +287,8 @@ impl Host {
         }
         for command in platform.commands {
             match command {
-                OutputCommand::CopyText(text) => self.hub.send(Errand::Copy { text }),
-                OutputCommand::OpenUrl(open) => self.hub.send(Errand::Visit { url: open.url }),
+                OutputCommand::CopyText(text) => self.hub.send(PageRequest::Copy { text }),
+                OutputCommand::OpenUrl(open) => self.hub.send(PageRequest::Visit { url: open.url }),
                 OutputCommand::CopyImage(_) => tracing::debug!("images are not copied into browsers"),
             }
         }

@@ -75,7 +75,7 @@ pub struct Words {
 /// What the window is to do for the page that drives, outside of what is drawn.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "t", rename_all = "snake_case")]
-pub enum Errand {
+pub enum PageRequest {
     /// Text goes to the clipboard.
     Copy {
         /// The text.
@@ -126,11 +126,11 @@ struct Page {
     reads: bool,
     /// Whether it has the latest frame and takes another.
     ready: bool,
-    errands: tokio::sync::mpsc::Sender<Errand>,
+    page_requests: tokio::sync::mpsc::Sender<PageRequest>,
 }
 
 /// Errands that wait for a page.
-const MOST_ERRANDS: usize = 16;
+const MOST_PAGE_REQUESTS: usize = 16;
 
 impl Hub {
     /// Nobody is there; what wakes the window comes out of the second.
@@ -166,7 +166,7 @@ impl Hub {
 
     /// A page has come. It drives when it is the first one, that of whoever has started this, or when it did before its
     /// connection was lost and nobody has since. Others drive when their person asks for it.
-    pub fn join(&self, name: &str) -> Option<(PageId, tokio::sync::mpsc::Receiver<Errand>)> {
+    pub fn join(&self, name: &str) -> Option<(PageId, tokio::sync::mpsc::Receiver<PageRequest>)> {
         let mut state = self.state();
         // The same page once more: its old connection is of no more use.
         let before = state.pages.iter().find(|(_, page)| page.name == name).map(|(id, _)| *id);
@@ -179,10 +179,10 @@ impl Hub {
         });
         let id = state.next;
         state.next += 1;
-        let (errands, errands_here) = tokio::sync::mpsc::channel(MOST_ERRANDS);
+        let (page_requests, page_requests_here) = tokio::sync::mpsc::channel(MOST_PAGE_REQUESTS);
         state.pages.insert(
             id,
-            Page { name: name.to_owned(), screen: None, visible: true, reads: false, ready: true, errands },
+            Page { name: name.to_owned(), screen: None, visible: true, reads: false, ready: true, page_requests },
         );
         let comes_back = state.driver.is_none() && state.drove.as_deref() == Some(name);
         if drove || comes_back || id == FIRST {
@@ -191,7 +191,7 @@ impl Hub {
         self.tell_people(&state);
         drop(state);
         self.wake();
-        Some((id, errands_here))
+        Some((id, page_requests_here))
     }
 
     /// A page has gone.
@@ -376,10 +376,10 @@ impl Hub {
     }
 
     /// Something for the page that drives.
-    pub fn send(&self, errand: Errand) {
+    pub fn send(&self, errand: PageRequest) {
         let state = self.state();
         let driver = state.driver.and_then(|id| state.pages.get(&id));
-        if driver.is_some_and(|page| page.errands.try_send(errand).is_err()) {
+        if driver.is_some_and(|page| page.page_requests.try_send(errand).is_err()) {
             tracing::debug!("a page takes no errands");
         }
     }

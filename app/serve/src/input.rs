@@ -18,7 +18,7 @@ const SCALES: std::ops::RangeInclusive<f32> = 0.5..=4.0;
 /// A message of a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "t", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Said {
+pub enum PageMessage {
     /// What a person did, in order.
     Input {
         /// The events.
@@ -379,12 +379,12 @@ fn note<T: PartialEq>(held: &mut Vec<T>, what: T, is_down: bool) {
 mod tests {
     use super::*;
 
-    fn said(json: &str) -> Said {
+    fn reported(json: &str) -> PageMessage {
         serde_json::from_str(json).expect("a message")
     }
 
     fn events(json: &str) -> Vec<Event> {
-        let Said::Input { events: done } = said(json) else { panic!("no input: {json}") };
+        let PageMessage::Input { events: done } = reported(json) else { panic!("no input: {json}") };
         let mut events = Vec::new();
         for done in done {
             done.add_to(&mut events);
@@ -413,7 +413,7 @@ mod tests {
             has_keyboard: false,
         };
         let stops = |json: &str, places: &StopPlaces| {
-            let Said::Input { events } = said(&format!(r#"{{"t":"input","events":[{json}]}}"#)) else {
+            let PageMessage::Input { events } = reported(&format!(r#"{{"t":"input","events":[{json}]}}"#)) else {
                 panic!("{json}")
             };
             events.iter().any(|done| done.stops(places))
@@ -469,7 +469,7 @@ mod tests {
         let huge = events(r#"{"t":"input","events":[{"e":"move","at":[1e30,-1e30]}]}"#);
         assert_eq!(huge, [Event::PointerMoved(Pos2::new(1e5, -1e5))]);
         for refused in [r#"{"t":"input","events":[{"e":"move"}]}"#, r#"{"t":"fly"}"#, "[]"] {
-            assert!(serde_json::from_str::<Said>(refused).is_err(), "{refused}");
+            assert!(serde_json::from_str::<PageMessage>(refused).is_err(), "{refused}");
         }
     }
 
@@ -503,10 +503,10 @@ mod tests {
                     _ => drop(message.remove(at)),
                 }
             }
-            let Ok(said) = serde_json::from_slice::<Said>(&message) else { continue };
+            let Ok(reported) = serde_json::from_slice::<PageMessage>(&message) else { continue };
             understood += 1;
-            match said {
-                Said::Input { events: done } => {
+            match reported {
+                PageMessage::Input { events: done } => {
                     events.clear();
                     for done in done {
                         done.add_to(&mut events);
@@ -517,7 +517,7 @@ mod tests {
                         }
                     }
                 }
-                Said::Screen(screen) if screen.is_sensible() => {
+                PageMessage::Screen(screen) if screen.is_sensible() => {
                     assert!(screen.width * screen.scale <= 4.0 * 8192.0);
                 }
                 _ => {}

@@ -102,8 +102,8 @@ mod tests {
     fn what_has_a_name_is_told_in_order_and_can_be_pressed() {
         let (ctx, mut on, mut presses) = (Context::default(), false, 0);
         draw(&ctx, Vec::new(), &mut on, &mut presses);
-        let told = draw(&ctx, Vec::new(), &mut on, &mut presses);
-        let short: Vec<_> = told.iter().map(|c| (c.role, c.label.as_str(), c.enabled, c.pressed)).collect();
+        let reported = draw(&ctx, Vec::new(), &mut on, &mut presses);
+        let short: Vec<_> = reported.iter().map(|c| (c.role, c.label.as_str(), c.enabled, c.pressed)).collect();
         assert_eq!(
             short,
             [
@@ -113,11 +113,11 @@ mod tests {
                 (Some("button"), "Solve", false, None),
             ]
         );
-        let press = |index: usize| vec![event(&told[index].id, true).expect("a number")];
+        let press = |index: usize| vec![event(&reported[index].id, true).expect("a number")];
         draw(&ctx, press(1), &mut on, &mut presses);
-        let told = draw(&ctx, press(2), &mut on, &mut presses);
+        let reported = draw(&ctx, press(2), &mut on, &mut presses);
         assert_eq!((presses, on), (1, true));
-        assert_eq!(draw(&ctx, Vec::new(), &mut on, &mut presses)[2].pressed, Some(true), "{told:?}");
+        assert_eq!(draw(&ctx, Vec::new(), &mut on, &mut presses)[2].pressed, Some(true), "{reported:?}");
         assert_eq!(event("12x", true), None);
     }
 }

@@ -17,8 +17,8 @@ use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::protocol::{Message, Role, WebSocketConfig};
 
 use super::difference::Shown;
-use super::hub::{Errand, Hub, PageId, People, Words};
-use super::input::Said;
+use super::hub::{Hub, PageId, PageRequest, People, Words};
+use super::input::PageMessage;
 use super::reading::Control;
 use super::upload::Uploads;
 
@@ -45,7 +45,7 @@ type Socket = WebSocketStream<TokioIo<Upgraded>>;
 /// What a page is told besides frames.
 #[derive(Serialize)]
 #[serde(tag = "t", rename_all = "snake_case")]
-enum Told<'a> {
+enum ServerMessage<'a> {
     /// Who drives.
     People { you: bool, driven: bool, pages: usize },
     /// What the page says by itself.
@@ -64,14 +64,14 @@ pub async fn attend(upgraded: Upgraded, name: String, hub: Arc<Hub>, uploads: Ar
     let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
     let socket: Socket = WebSocketStream::from_raw_socket(TokioIo::new(upgraded), Role::Server, Some(config)).await;
     let (to_page, from_page) = socket.split();
-    let Some((id, errands)) = hub.join(&name) else {
+    let Some((id, page_requests)) = hub.join(&name) else {
         tracing::info!("a page was not let in: there are too many");
         return;
     };
     let (shown, acknowledged) = watch::channel(0);
     // Either ends the other.
     let ended = tokio::select! {
-        ended = write(to_page, id, &hub, errands, acknowledged) => ended,
+        ended = write(to_page, id, &hub, page_requests, acknowledged) => ended,
         ended = read(from_page, id, &hub, &uploads, shown) => ended,
     };
     hub.leave(id);
@@ -97,29 +97,29 @@ async fn read(
             Message::Close(_) => return "closed by the page",
             Message::Binary(_) | Message::Frame(_) => return "not understood",
         };
-        let Ok(said) = serde_json::from_str::<Said>(&text) else { return "not understood" };
-        match said {
-            Said::Input { events } => {
+        let Ok(reported) = serde_json::from_str::<PageMessage>(&text) else { return "not understood" };
+        match reported {
+            PageMessage::Input { events } => {
                 if hub.done(id, events).is_err() {
                     return "too much";
                 }
             }
-            Said::Screen(screen) if screen.is_sensible() => hub.screen(id, screen),
-            Said::Screen(_) => return "no size",
-            Said::Shown { number } => {
+            PageMessage::Screen(screen) if screen.is_sensible() => hub.screen(id, screen),
+            PageMessage::Screen(_) => return "no size",
+            PageMessage::Shown { number } => {
                 shown.send_replace(number);
             }
-            Said::Visible { visible } => {
+            PageMessage::Visible { visible } => {
                 if !visible {
                     hub.let_go(id);
                 }
                 hub.sees(id, Some(visible), None);
             }
-            Said::Reads { reads } => hub.reads(id, reads),
-            Said::Held => hub.held(id),
-            Said::Stop => hub.stop(),
-            Said::Drive => hub.drive(id),
-            Said::Open { upload } => {
+            PageMessage::Reads { reads } => hub.reads(id, reads),
+            PageMessage::Held => hub.held(id),
+            PageMessage::Stop => hub.stop(),
+            PageMessage::Drive => hub.drive(id),
+            PageMessage::Open { upload } => {
                 if let Some(folder) = uploads.finished(&upload) {
                     hub.open(id, folder);
                 }
@@ -132,7 +132,7 @@ async fn write(
     mut to_page: SplitSink<Socket, Message>,
     id: PageId,
     hub: &Hub,
-    mut errands: mpsc::Receiver<Errand>,
+    mut page_requests: mpsc::Receiver<PageRequest>,
     mut acknowledged: watch::Receiver<u64>,
 ) -> &'static str {
     let (mut frames, mut people, mut words) = (hub.frames(), hub.people(), hub.words());
@@ -157,14 +157,14 @@ async fn write(
                     return "replaced";
                 }
                 let People { driver, pages } = *people.borrow_and_update();
-                json(&Told::People { you: driver == Some(id), driven: driver.is_some(), pages })
+                json(&ServerMessage::People { you: driver == Some(id), driven: driver.is_some(), pages })
             }
             changed = words.changed() => {
                 if changed.is_err() {
                     return "ended";
                 }
                 let words = words.borrow_and_update();
-                json(&Told::Words { words: &words })
+                json(&ServerMessage::Words { words: &words })
             }
             changed = controls.changed() => {
                 if changed.is_err() {
@@ -174,9 +174,9 @@ async fn write(
                 if !hub.is_read(id) {
                     continue;
                 }
-                json(&Told::Controls { controls: &controls })
+                json(&ServerMessage::Controls { controls: &controls })
             }
-            Some(errand) = errands.recv() => json(&errand),
+            Some(errand) = page_requests.recv() => json(&errand),
             changed = acknowledged.changed() => {
                 if changed.is_err() {
                     return "ended";
@@ -195,15 +195,15 @@ async fn write(
                 last = number;
                 sent += 1;
                 // Elsewhere: the threads that listen to pages have no time for it.
-                let told = tokio::task::spawn_blocking(move || {
+                let stated = tokio::task::spawn_blocking(move || {
                     let message = page.message(sent, &frame);
                     (page, message)
                 });
-                let Ok((after, message)) = told.await else { return "failed" };
+                let Ok((after, message)) = stated.await else { return "failed" };
                 page = after;
                 Message::binary(message)
             }
-            _ = alive.tick() => json(&Told::Alive),
+            _ = alive.tick() => json(&ServerMessage::Alive),
             _ = pings.tick() => {
                 if !has_room && taken.elapsed() > STALLED {
                     return "stalled";
@@ -219,7 +219,7 @@ async fn write(
     }
 }
 
-fn json(told: &impl Serialize) -> Message {
+fn json(stated: &impl Serialize) -> Message {
     // Words and numbers only: they can be written.
-    Message::text(serde_json::to_string(told).unwrap_or_default())
+    Message::text(serde_json::to_string(stated).unwrap_or_default())
 }

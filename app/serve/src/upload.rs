@@ -81,7 +81,7 @@ impl Drop for Coming<'_> {
 }
 
 /// Why a file was not taken.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 pub enum UploadError {
     /// The path leads elsewhere or is none.
     #[error("the name of a file may not lead out of its folder")]

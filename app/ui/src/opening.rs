@@ -34,7 +34,7 @@ pub struct Opening {
 pub type Begin = Box<dyn FnOnce(&mut App) -> anyhow::Result<()>>;
 
 impl Opening {
-    /// Reads the settings; what cannot be read there is said in the window.
+    /// Reads the settings; what cannot be read there is reported in the window.
     ///
     /// # Errors
     /// When there are boxes that the arm keeps out of, or a scene that was asked for, and they cannot be read.

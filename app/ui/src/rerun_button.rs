@@ -59,16 +59,16 @@ fn hint_ui(ui: &mut Ui, rerun: &RerunState, language: Language) {
         ViewerState::Connected { url } => text!("The recording goes to the viewer at {url} already", url = url),
         ViewerState::Failed(why) => why.clone(),
     };
-    ui.label(viewer.say(language));
+    ui.label(viewer.in_language(language));
     if let Some(file) = &rerun.file {
-        ui.label(text!("Recorded into {file}", file = file.display()).say(language));
+        ui.label(text!("Recorded into {file}", file = file.display()).in_language(language));
     }
     if rerun.left_out > 0 {
         let text = text!(
             "{count} live {count|entry was|entries were} left out: the viewer or the disk is slow",
             count = rerun.left_out
         );
-        ui.label(text.say(language));
+        ui.label(text.in_language(language));
     }
 }
 

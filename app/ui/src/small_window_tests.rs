@@ -55,7 +55,7 @@ fn what_a_person_has_to_do_by_hand_is_whole_over_the_image() {
         let refused_at = model.robot.as_ref().map(|robot| robot.base_from_tip);
         let hand =
             ByHand { judged: Some(judged), refused_at, ..ByHand::new(GuidedOptions::default(), HandWaits::View, 0.0) };
-        let words = to_do(&hand).say(language);
+        let words = to_do(&hand).in_language(language);
         model.by_hand = Some(Box::new(hand));
         let silent = small(model, language, false);
         assert!(is_whole(&silent, &words), "{words}");

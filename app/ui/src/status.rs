@@ -184,7 +184,7 @@ fn try_now(model: &Model) -> Action {
 
 /// A reason as a sentence of the window's language.
 fn sentence(why: &Text, language: Language) -> Text {
-    Text::verbatim(sentence_of(&why.say(language), if language == Language::Chinese { "。" } else { "." }))
+    Text::verbatim(sentence_of(&why.in_language(language), if language == Language::Chinese { "。" } else { "." }))
 }
 
 /// First letter large, unless the first word is a name in code; full stop at the end.
@@ -228,9 +228,9 @@ mod tests {
         assert_eq!(sentence_of("", "."), "");
         let why = text!("the robot's driver has not sent a state yet");
         assert_eq!(
-            sentence(&why, Language::English).say(Language::Chinese),
+            sentence(&why, Language::English).in_language(Language::Chinese),
             "The robot's driver has not sent a state yet."
         );
-        assert_eq!(sentence(&why, Language::Chinese).say(Language::English), "机器人的驱动还没有发送状态。");
+        assert_eq!(sentence(&why, Language::Chinese).in_language(Language::English), "机器人的驱动还没有发送状态。");
     }
 }

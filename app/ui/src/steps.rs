@@ -226,13 +226,13 @@ mod tests {
     use super::*;
     use handeye_workbench::text::Language;
 
-    fn said(facts: &Facts) -> Vec<(StepState, String)> {
-        judged(facts).into_iter().map(|status| (status.state, status.line.say(Language::English))).collect()
+    fn reported(facts: &Facts) -> Vec<(StepState, String)> {
+        judged(facts).into_iter().map(|status| (status.state, status.line.in_language(Language::English))).collect()
     }
 
     #[test]
     fn at_first_only_connecting_can_be_done_and_every_other_step_says_what_it_needs() {
-        let steps = said(&Facts::default());
+        let steps = reported(&Facts::default());
         assert_eq!(steps[0], (StepState::Now, "No connection".to_owned()));
         for (state, line) in &steps[1..] {
             assert_eq!(*state, StepState::Blocked);
@@ -244,36 +244,36 @@ mod tests {
     fn captures_are_counted_towards_what_is_wanted() {
         let mut facts = Facts { connected: true, frame_seen: true, board_in_view: true, ..Facts::default() };
         facts.captures_in_use = 7;
-        assert_eq!(said(&facts)[2], (StepState::Now, "7 of 10 poses".to_owned()));
-        assert_eq!(said(&facts)[3].0, StepState::Now, "three poses are enough to solve");
+        assert_eq!(reported(&facts)[2], (StepState::Now, "7 of 10 poses".to_owned()));
+        assert_eq!(reported(&facts)[3].0, StepState::Now, "three poses are enough to solve");
         facts.captures_in_use = 10;
-        assert_eq!(said(&facts)[2], (StepState::Done, "10 poses".to_owned()));
+        assert_eq!(reported(&facts)[2], (StepState::Done, "10 poses".to_owned()));
     }
 
     #[test]
     fn a_board_that_is_out_of_view_on_the_way_to_a_pose_is_nothing_to_do() {
         let facts = Facts { connected: true, frame_seen: true, board_captured: true, ..Facts::default() };
-        assert_eq!(said(&facts)[1], (StepState::Now, "Board out of view".to_owned()));
-        assert_eq!(said(&Facts { sequence_runs: true, ..facts })[1].0, StepState::Done);
+        assert_eq!(reported(&facts)[1], (StepState::Now, "Board out of view".to_owned()));
+        assert_eq!(reported(&Facts { sequence_runs: true, ..facts })[1].0, StepState::Done);
     }
 
     #[test]
     fn captures_on_the_disk_can_be_solved_without_a_connection() {
         let facts = Facts { captures_in_use: 12, board_in_view: true, ..Facts::default() };
-        assert_eq!(said(&facts)[0].0, StepState::Now);
-        assert_eq!(said(&facts)[3].0, StepState::Now);
+        assert_eq!(reported(&facts)[0].0, StepState::Now);
+        assert_eq!(reported(&facts)[3].0, StepState::Now);
     }
 
     /// Of images alone there is a camera to export, and nothing of a robot to verify or to track with.
     #[test]
     fn without_a_robot_the_export_comes_after_the_answer() {
         let facts = Facts { captures_in_use: 12, no_robot: true, solved: true, ..Facts::default() };
-        let steps = said(&facts);
+        let steps = reported(&facts);
         assert_eq!(steps[2], (StepState::Done, "12 images".to_owned()));
         let needs_robot = (StepState::Blocked, "Needs robot poses".to_owned());
         assert_eq!([&steps[4], &steps[6]], [&needs_robot, &needs_robot]);
         assert_eq!(steps[5].0, StepState::Now);
-        let few = said(&Facts { captures_in_use: 2, solved: false, ..facts });
+        let few = reported(&Facts { captures_in_use: 2, solved: false, ..facts });
         assert_eq!(few[2], (StepState::Blocked, "2 images".to_owned()));
         assert_eq!(few[3], (StepState::Blocked, "Needs 3 images".to_owned()));
     }
@@ -282,50 +282,50 @@ mod tests {
     fn an_answer_is_told_by_its_expected_error_and_opens_the_steps_after_it() {
         let mut facts = Facts { captures_in_use: 10, board_in_view: true, solved: true, ..Facts::default() };
         facts.expected_error_m = Some(0.000_42);
-        assert_eq!(said(&facts)[3], (StepState::Done, "±0.42 mm (95 %)".to_owned()));
-        assert_eq!((said(&facts)[4].0, said(&facts)[5].0), (StepState::Now, StepState::Now));
+        assert_eq!(reported(&facts)[3], (StepState::Done, "±0.42 mm (95 %)".to_owned()));
+        assert_eq!((reported(&facts)[4].0, reported(&facts)[5].0), (StepState::Now, StepState::Now));
         facts.solving = true;
-        assert_eq!(said(&facts)[3].0, StepState::Now, "an answer that is being replaced is not done");
+        assert_eq!(reported(&facts)[3].0, StepState::Now, "an answer that is being replaced is not done");
     }
 
     #[test]
     fn a_verification_that_fails_is_not_ticked() {
         let facts = Facts { captures_in_use: 10, solved: true, verifying: 4, verified: true, ..Facts::default() };
-        assert_eq!(said(&facts)[4], (StepState::Done, "4 captures".to_owned()));
-        let failed = said(&Facts { contradicted: true, ..facts });
+        assert_eq!(reported(&facts)[4], (StepState::Done, "4 captures".to_owned()));
+        let failed = reported(&Facts { contradicted: true, ..facts });
         assert_eq!(failed[4], (StepState::Now, "Errors larger than stated".to_owned()));
     }
 
     #[test]
     fn tracking_needs_a_calibration_and_a_connection_and_a_board_that_is_lost_is_to_be_found() {
         let mut facts = Facts { captures_in_use: 10, board_in_view: true, ..Facts::default() };
-        assert_eq!(said(&facts)[6], (StepState::Blocked, "Needs a calibration".to_owned()));
+        assert_eq!(reported(&facts)[6], (StepState::Blocked, "Needs a calibration".to_owned()));
         facts.solved = true;
-        assert_eq!(said(&facts)[6], (StepState::Blocked, "Needs a connection".to_owned()));
+        assert_eq!(reported(&facts)[6], (StepState::Blocked, "Needs a connection".to_owned()));
         facts.connected = true;
-        assert_eq!(said(&facts)[6], (StepState::Now, "Follow the board".to_owned()));
+        assert_eq!(reported(&facts)[6], (StepState::Now, "Follow the board".to_owned()));
         facts.tracking = true;
-        assert_eq!(said(&facts)[6], (StepState::Done, "Tracking".to_owned()));
+        assert_eq!(reported(&facts)[6], (StepState::Done, "Tracking".to_owned()));
         facts.out_of_sight = true;
-        assert_eq!(said(&facts)[6], (StepState::Now, "Board out of sight".to_owned()));
+        assert_eq!(reported(&facts)[6], (StepState::Now, "Board out of sight".to_owned()));
     }
 
     #[test]
     fn a_broken_connection_is_no_longer_done() {
         let facts = Facts { lost: true, frame_seen: true, board_in_view: true, ..Facts::default() };
-        assert_eq!(said(&facts)[0], (StepState::Now, "Connection lost".to_owned()));
+        assert_eq!(reported(&facts)[0], (StepState::Now, "Connection lost".to_owned()));
     }
 
     #[test]
     fn a_board_that_left_the_view_is_not_ticked_and_called_for_only_while_captures_are_missing() {
         let mut facts = Facts { connected: true, frame_seen: true, board_captured: true, ..Facts::default() };
         facts.captures_in_use = 4;
-        assert_eq!(said(&facts)[1], (StepState::Now, "Board out of view".to_owned()));
+        assert_eq!(reported(&facts)[1], (StepState::Now, "Board out of view".to_owned()));
         assert_eq!(next(&judged(&facts)), Some(Step::Target));
         facts.captures_in_use = 10;
         assert_eq!(next(&judged(&facts)), Some(Step::Solve));
         facts.connected = false;
-        assert_eq!(said(&facts)[1], (StepState::Done, "Board in the captures".to_owned()));
+        assert_eq!(reported(&facts)[1], (StepState::Done, "Board in the captures".to_owned()));
     }
 
     #[test]

@@ -522,10 +522,10 @@ fn why_there_is_no_capture_is_on_the_screen_once_and_the_table_keeps_it() {
     silent.show(Pane::Poses);
     let why = handeye_workbench::text::Text::verbatim("the board is not in view");
     let mut model = handeye_workbench::testing::sample::captured();
-    let said = handeye_wording::text!("No capture: {why}", why = why.clone());
+    let reported = handeye_wording::text!("No capture: {why}", why = why.clone());
     let at_s = model.now_s;
     let home = handeye_workbench::model::Home::Pane(Pane::Colour);
-    model.messages.say_at(home, handeye_workbench::model::Severity::Warning, said, at_s);
+    model.messages.say_at(home, handeye_workbench::model::Severity::Warning, reported, at_s);
     let kind = handeye_workbench::model::RefusalKind::NoBoard;
     model.refused = Some(handeye_workbench::model::CaptureRefused { kind, why, at_s });
     silent.show_model(model.clone());

@@ -17,7 +17,7 @@ use image::GrayImage;
 use rayon::prelude::*;
 
 /// Why a data set or a session could not be observed.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 pub enum ObserveError {
     /// An image of a data set could not be read.
     #[error(transparent)]
@@ -292,7 +292,7 @@ fn of_each<T: Send>(
 mod tests {
     use super::*;
 
-    /// A board of ten columns that is said to have nine looks like one where the border of an image hides a column.
+    /// A board of ten columns that is reported to have nine looks like one where the border of an image hides a column.
     #[test]
     fn a_board_with_a_column_more_is_named_although_some_images_hide_it() {
         let grid = Grid { columns: 9, rows: 7, square_m: 0.02 };

@@ -8,8 +8,8 @@ fn write(wanted: Option<SettingsWrite>) -> Result<(), Warning> {
     wanted.expect("something has changed").perform()
 }
 
-fn said(warnings: &[Warning]) -> Vec<String> {
-    warnings.iter().map(|Warning(text)| text.say(Language::English)).collect()
+fn reported(warnings: &[Warning]) -> Vec<String> {
+    warnings.iter().map(|Warning(text)| text.in_language(Language::English)).collect()
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn what_was_written_is_read_again() {
 fn a_bad_value_is_told_with_its_line_and_key_and_the_others_are_taken() {
     let mut settings = Settings::default();
     let content = "# mine\ntheme = \"blue\"\nlanguage = \"zh-CN\"\n\ndepth_scale = 3\ncolour = \"red\"\n";
-    let warnings = said(&settings.read("settings.toml", content));
+    let warnings = reported(&settings.read("settings.toml", content));
     assert_eq!(warnings.len(), 3, "{warnings:?}");
     assert!(
         warnings
@@ -52,7 +52,7 @@ fn a_bad_value_is_told_with_its_line_and_key_and_the_others_are_taken() {
 #[test]
 fn a_bad_list_is_told_and_a_long_one_is_cut() {
     let mut settings = Settings::default();
-    let warnings = said(&settings.read("settings.toml", "addresses = [\"tcp://a:1\", 3]\ntheme = \"light\"\n"));
+    let warnings = reported(&settings.read("settings.toml", "addresses = [\"tcp://a:1\", 3]\ntheme = \"light\"\n"));
     assert!(warnings[0].contains("line 1") && warnings[0].contains("addresses"), "{warnings:?}");
     assert_eq!((settings.addresses.len(), settings.theme), (0, ThemeChoice::Light));
     let many = format!("addresses = {:?}", ["tcp://a:1"; ADDRESSES + 1]);
@@ -64,7 +64,7 @@ fn a_bad_list_is_told_and_a_long_one_is_cut() {
 fn a_bad_variable_is_told_with_what_it_may_be() {
     let mut settings = Settings::default();
     let bad = |name: &str| (name == "HANDEYE_ROTATION").then(|| "euler".to_owned());
-    let warnings = said(&settings.read_environment(bad));
+    let warnings = reported(&settings.read_environment(bad));
     assert!(warnings[0].contains("HANDEYE_ROTATION") && warnings[0].contains("`rpy` or `quaternion`"), "{warnings:?}");
     assert_eq!(warnings.len(), 1);
 }
@@ -72,7 +72,7 @@ fn a_bad_variable_is_told_with_what_it_may_be() {
 #[test]
 fn a_line_that_is_no_toml_is_told_and_the_lines_around_it_are_taken() {
     let mut settings = Settings::default();
-    let warnings = said(&settings.read("settings.toml", "theme = \"light\"\n= what\nlanguage = \"zh-CN\"\n"));
+    let warnings = reported(&settings.read("settings.toml", "theme = \"light\"\n= what\nlanguage = \"zh-CN\"\n"));
     assert!(warnings.iter().any(|text| text.contains("line 2")), "{warnings:?}");
     assert_eq!(settings.theme, ThemeChoice::Light);
 }
@@ -125,7 +125,7 @@ fn objects_of_the_scene_are_in_the_file_once_they_are_changed_and_not_those_of_o
     assert_eq!(SettingsFile::open(Some(path), nothing).1.objects, chosen);
     let mut read = Settings::default();
     for (line, why) in [("flange = \"/Panda\"", "flange"), ("tip = \"Panda\"", "begins with /")] {
-        let warnings = said(&read.read("settings.toml", &format!("[objects]\n{line}\n")));
+        let warnings = reported(&read.read("settings.toml", &format!("[objects]\n{line}\n")));
         assert!(warnings[0].contains(why) && read == Settings::default(), "{warnings:?}");
     }
 }
@@ -138,7 +138,7 @@ fn a_file_that_cannot_be_written_is_told() {
     let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
     let view = ViewSettings { theme: settings.theme.other(), ..settings.view() };
     let Err(Warning(text)) = write(file.keep(view, &[], &[], &CellPaths::default())) else { panic!("it went well") };
-    assert!(text.say(Language::English).contains("settings.toml"));
+    assert!(text.in_language(Language::English).contains("settings.toml"));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::*;
 fn a_text_is_said_in_the_language_with_its_values() {
     let reason = Text::verbatim("no answer {code}");
     let text = handeye_wording::text!("No {thing} {why}.", thing = 3, why = reason);
-    assert_eq!(text.say(Language::English), "No 3 no answer {code}.", "values are not templates");
+    assert_eq!(text.in_language(Language::English), "No 3 no answer {code}.", "values are not templates");
     let kept: Text = serde_json::from_str(&serde_json::to_string(&text).expect("json")).expect("text");
     assert_eq!(kept, text);
 }
@@ -16,8 +16,8 @@ fn a_text_is_said_in_the_language_with_its_values() {
 fn a_noun_is_singular_where_its_count_is_one_and_chinese_has_one_form() {
     for (count, english) in [(0, "0 captures"), (1, "1 capture"), (2, "2 captures"), (11, "11 captures")] {
         let text = handeye_wording::text!("{count} {count|capture|captures}", count = count);
-        assert_eq!(text.say(Language::English), english);
-        assert_eq!(text.say(Language::Chinese), format!("{count} 次采集"));
+        assert_eq!(text.in_language(Language::English), english);
+        assert_eq!(text.in_language(Language::Chinese), format!("{count} 次采集"));
     }
 }
 
@@ -37,18 +37,18 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 /// The first string literal after a position, unescaped; `None` when something else comes first.
 fn literal(source: &str) -> Option<String> {
     let start = source.find('"')?;
-    let mut said = String::new();
+    let mut reported = String::new();
     let mut letters = source[start + 1..].chars().peekable();
     while let Some(letter) = letters.next() {
         match letter {
-            '"' => return Some(said),
+            '"' => return Some(reported),
             '\\' => match letters.next()? {
-                'n' => said.push('\n'),
+                'n' => reported.push('\n'),
                 // A line that goes on: the indentation of the next one does not count.
                 '\n' => while letters.next_if(|next| next.is_whitespace()).is_some() {},
-                other => said.push(other),
+                other => reported.push(other),
             },
-            other => said.push(other),
+            other => reported.push(other),
         }
     }
     None
@@ -69,7 +69,7 @@ fn all_sources() -> Vec<(PathBuf, String)> {
     files.into_iter().map(read).collect()
 }
 
-/// The message of an error as `derive(Said)` makes a template of it: without the formats of its values.
+/// The message of an error as `derive(Localized)` makes a template of it: without the formats of its values.
 fn without_formats(message: &str) -> String {
     let parts = message.split('{').enumerate();
     let part = |(at, part): (usize, &str)| match part.split_once('}') {
@@ -204,15 +204,15 @@ fn an_error_within_errors_is_said_in_chinese_to_its_end() {
 
     let source = CameraError::BehindCamera { z_m: -1.0 };
     let error = CalibrateError::Intrinsics(IntrinsicsError::BadStart { source });
-    assert_eq!(Text::from(&error).say(Language::English), error.to_string(), "the command line says the same");
-    assert_eq!(Text::from(&error).say(Language::Chinese), "相机模型：z = -1 m 处的点不在相机前方");
+    assert_eq!(Text::from(&error).in_language(Language::English), error.to_string(), "the command line says the same");
+    assert_eq!(Text::from(&error).in_language(Language::Chinese), "相机模型：z = -1 m 处的点不在相机前方");
 
     let why = Ending::Silent { after: std::time::Duration::from_secs(3) };
     let error = DriverError::Gone { driver: "a.py".to_owned(), why };
-    assert_eq!(Text::from(&error).say(Language::English), error.to_string());
-    assert_eq!(Text::from(&error).say(Language::Chinese), "驱动 `a.py` 3 s 没有应答 `ping`");
+    assert_eq!(Text::from(&error).in_language(Language::English), error.to_string());
+    assert_eq!(Text::from(&error).in_language(Language::Chinese), "驱动 `a.py` 3 s 没有应答 `ping`");
     let failed = handeye_wording::text!("The connection could not be started: {error}", error = &error);
-    assert!(failed.say(Language::Chinese).ends_with("驱动 `a.py` 3 s 没有应答 `ping`"), "errors are values");
+    assert!(failed.in_language(Language::Chinese).ends_with("驱动 `a.py` 3 s 没有应答 `ping`"), "errors are values");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::MAX_JOINTS;
 
 /// What is wrong with a joint.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum JointDefect {
     /// NaN or infinite.
@@ -31,7 +31,7 @@ pub enum JointDefect {
 }
 
 /// Why an arm, or joint values with it, cannot be computed with.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ArmError {
     /// No joints, or more than any arm has.

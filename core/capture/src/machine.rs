@@ -13,7 +13,7 @@ use handeye_geometry::targets::observation::Corner;
 /// late image of a computer under load, is waited for.
 pub const NO_IMAGES_S: f64 = 5.0;
 
-/// Images that must have come before robot or image are said not to come to rest: twice as many as show that they
+/// Images that must have come before robot or image are reported not to come to rest: twice as many as show that they
 /// are. A simulation that runs as fast as it can may pass the limit of time between two.
 const FAIR_IMAGES: u32 = 8;
 
@@ -158,7 +158,7 @@ impl Machine {
         }
         self.arrived_s = shot.received_s;
         let passed_s = self.sim_time_s.map(|before_s| shot.sim_time_s - before_s);
-        // A simulation that was started anew counts from its own beginning. Images of an instant that was seen, or of
+        // A simulation that was started again counts from its own beginning. Images of an instant that was seen, or of
         // none, say nothing.
         if passed_s == Some(0.0) || !shot.sim_time_s.is_finite() {
             return self.progress();

@@ -11,7 +11,7 @@ use handeye_wording::text;
 /// What is wrong, in which file, and in which of its rows. One line of text: `FILE, row N: what, and what to do`.
 ///
 /// The file could not be used as input: a command line ends with code 2.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[error("{place}: {problem}", place = place(file, *row))]
 #[non_exhaustive]
 pub struct DatasetError {
@@ -40,7 +40,7 @@ fn place(file: &Path, row: Option<usize>) -> Text {
 }
 
 /// A defect of a dataset folder.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum DatasetProblem {
     /// The file system says no.
@@ -262,7 +262,7 @@ pub enum DatasetProblem {
         /// Rows of the target.
         rows: usize,
     },
-    /// A corner beside the image it is said to be in.
+    /// A corner beside the image it is reported to be in.
     #[error("({u_px}, {v_px}) is outside of the image of {of} px", of = self::size(*size))]
     OutsideImage {
         /// Column in pixels.

@@ -202,7 +202,7 @@ impl Dataset {
             entries: out,
             image_size,
             arm,
-            outside: outside.said(poses_file.as_ref()),
+            outside: outside.problems(poses_file.as_ref()),
             pose_table: poses_file.map(|f| f.path),
             text_files,
             #[cfg(feature = "digest")]

@@ -43,7 +43,7 @@ impl<'a> Outside<'a> {
 
     /// Says what lies outside and gives it.
     #[cfg_attr(not(feature = "tracing"), expect(unused_variables, reason = "there is nobody to say it to"))]
-    pub fn said(self, table: Option<&TextFile>) -> Vec<String> {
+    pub fn problems(self, table: Option<&TextFile>) -> Vec<String> {
         #[cfg(feature = "tracing")]
         if let Some(first) = self.names.first() {
             let file = table.map_or_else(|| self.folder.display(), |table| table.path.display());

@@ -122,7 +122,7 @@ pub struct TaughtJoint {
     pub range: Option<[f64; 2]>,
 }
 
-/// Ends of a joint that differ by less are the same \[rad, m\], and tips \[m\]: a simulator computes them anew for every connection.
+/// Ends of a joint that differ by less are the same \[rad, m\], and tips \[m\]: a simulator computes them again for every connection.
 const SAME_RANGE: f64 = 1e-6;
 const SAME_TIP_M: f64 = 1e-3;
 
@@ -175,7 +175,7 @@ pub struct MotionLimits {
 }
 
 /// What is wrong with a pose file, in one line: `FILE, row N, pose "NAME": what`.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[error("{place}: {problem}", place = place(file, *row, pose.as_deref()))]
 #[non_exhaustive]
 pub struct PosesError {
@@ -207,7 +207,7 @@ impl PosesError {
 }
 
 /// A defect of a pose file.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PosesProblem {
     /// The file system does not give it.

@@ -58,7 +58,7 @@ impl TypedRotation {
 }
 
 /// Why a text is no pose in its convention.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum TypedPoseError {
     /// A word that is no number.

@@ -5,7 +5,7 @@ use handeye_geometry::progress::CancelToken;
 /// Why there is no detection.
 ///
 /// A board that is simply not in the image is not an error: [`detect`](super::detect) returns `None`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum VisionError {
     /// The target cannot be looked for.
@@ -29,7 +29,7 @@ pub enum VisionError {
          layout = \"{seen}\", or leave it out"
     )]
     OtherLayout {
-        /// What is said.
+        /// What is reported.
         stated: &'static str,
         /// What is seen.
         seen: &'static str,

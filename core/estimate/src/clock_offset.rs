@@ -34,7 +34,7 @@ pub struct ClockOffset {
 }
 
 /// Why no offset can be told.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ClockOffsetError {
     /// Too short.

@@ -47,7 +47,7 @@ fn recorded(waves: &[[f64; 3]], seconds: f64, noise: (f64, f64), seed: u64) -> B
     (robot, camera)
 }
 
-fn told((robot, camera): &Both, within_s: f64) -> Result<ClockOffset, ClockOffsetError> {
+fn reported((robot, camera): &Both, within_s: f64) -> Result<ClockOffset, ClockOffsetError> {
     clock_offset(robot, camera, within_s, &CancelToken::default())
 }
 
@@ -62,7 +62,7 @@ fn the_offset_is_found_as_well_as_it_is_said_to_be() {
                 *pose = pose.perturbed(&Vector6::new(0.1, 0.0, 0.05, 0.0, 1.0, 0.3));
             }
         }
-        let ClockOffset { offset_s, sigma_s } = told(&both, 1.0).expect("told");
+        let ClockOffset { offset_s, sigma_s } = reported(&both, 1.0).expect("told");
         assert!(sigma_s < 1e-3, "seed {seed}: {sigma_s}");
         squares += ((offset_s - OFFSET_S) / sigma_s).powi(2) / sessions as f64;
     }
@@ -87,11 +87,11 @@ fn a_motion_that_tells_no_time_is_refused() {
             (t, seen.perturbed(&noise_twist(&mut rng, 1e-3, 2e-3)))
         })
         .collect();
-    let refused = told(&(robot, camera), 0.5);
+    let refused = reported(&(robot, camera), 0.5);
     assert!(refused.is_err(), "{refused:?}");
     // A robot that stands still.
     let (robot, camera) = recorded(&[], 6.0, (1e-3, 2e-3), 6);
-    let refused = told(&(robot, camera), 0.5);
+    let refused = reported(&(robot, camera), 0.5);
     assert!(refused.is_err(), "{refused:?}");
 }
 
@@ -100,9 +100,9 @@ fn a_motion_that_repeats_itself_is_told_from_one_that_does_not() {
     // Twice a second on all axes: an offset of half a second more fits as well, and one of a quarter nearly so.
     let twice: Vec<[f64; 3]> = (0..6).map(|k| [0.4, 2.0, f64::from(k)]).collect();
     let both = recorded(&twice, 10.0, (1e-3, 2e-3), 7);
-    let refused = told(&both, 1.0).expect_err("it repeats itself");
+    let refused = reported(&both, 1.0).expect_err("it repeats itself");
     assert!(matches!(refused, ClockOffsetError::Ambiguous { .. }), "{refused}");
-    let near = told(&both, 0.1).expect("once it is known roughly");
+    let near = reported(&both, 0.1).expect("once it is known roughly");
     assert!((near.offset_s - OFFSET_S).abs() < 5.0 * near.sigma_s, "{near:?}");
 }
 

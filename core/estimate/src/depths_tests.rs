@@ -87,7 +87,7 @@ fn error_m_of(t: &Session, found: &Fit) -> f64 {
     (there.isometry() * point - t.mount_from_camera.isometry() * point).norm()
 }
 
-/// By how much the depths of a camera are off, by place in the image (−1 … 1) and depth; drawn anew for every image.
+/// By how much the depths of a camera are off, by place in the image (−1 … 1) and depth; drawn again for every image.
 type Error = Box<dyn Fn(Vector2<f64>, f64) -> f64>;
 
 /// Makes one for every image.

@@ -78,7 +78,6 @@
 //! cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
 
 mod bend;
-pub mod claim;
 pub mod clock_offset;
 mod corners;
 mod detected_view;
@@ -93,6 +92,7 @@ mod residuals;
 pub mod resolution;
 pub mod shared_lens;
 pub(crate) mod size;
+pub mod stated_uncertainty;
 #[cfg(test)]
 mod test_sessions;
 mod two_poses;
@@ -102,19 +102,19 @@ mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2};
 
-use crate::claim::Alternative;
 use crate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::{
-    CornerWeights, DepthWeight, Free, Noise, PrintErrors, RobotField, ShownDistortion, SmallSample,
+    CornerWeights, DepthWeight, Free, Noise, PoseDependentError, PrintErrors, ShownDistortion, SmallSample,
 };
 use crate::handeye::one_axis::PartialHandEye;
 use crate::handeye::screening::Distance;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, motion, one_axis, subset};
 use crate::intrinsics::IntrinsicsError;
 use crate::shared_lens::SharedLens;
+use crate::stated_uncertainty::Alternative;
+use crate::uncertainty::overdispersion::Overdispersion;
 use crate::uncertainty::quality;
-use crate::uncertainty::widening::Widening;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Camera, Pose, Target};
 pub use handeye_geometry::observations::{CameraKnowledge, DEFAULT_MODEL, Observations, ObservedView};
@@ -250,7 +250,7 @@ pub struct TargetSize {
 }
 
 /// Why there is no calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum CalibrateError {
     /// The target was not found in enough images.
@@ -471,7 +471,7 @@ pub struct JointFit {
     /// How the error of the hand-eye transform is distributed in units of its covariance.
     pub small_sample: SmallSample,
     /// Whether the covariances are true to the data, and by how much they were widened.
-    pub widening: Widening,
+    pub widening: Overdispersion,
     /// Where the expected error is stated: where the camera saw the target, camera coordinates, metres.
     pub reference_point: Point3<f64>,
     /// That error by number of views, by the noise alone.
@@ -482,7 +482,7 @@ pub struct JointFit {
     /// The same by the two links alone, without the robot's field; the same number where there is none.
     pub heldout_links_rms_px: Option<f64>,
     /// Errors of the robot that depend on where it stands, where the data show them.
-    pub field: Option<RobotField>,
+    pub field: Option<PoseDependentError>,
     /// What the points of the target are off their drawing, where the data show it; residuals are with it.
     pub print: Option<PrintErrors>,
     /// What the lens does beyond its model, where the data show it; residuals are with it.

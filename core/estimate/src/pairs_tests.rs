@@ -135,6 +135,6 @@ fn a_robot_that_only_turns_tells_no_unit() {
     }
     let options = Options { free_scale: true, ..Options::default() };
     let found = fit_with(&observations, Method::Joint, options, &CancelToken::default());
-    let told = found.map(|c| c.pose_fit.and_then(|fit| fit.shape?.scale_sigma));
-    assert!(!matches!(told, Ok(Some(sigma)) if sigma < 0.5), "{told:?}");
+    let reported = found.map(|c| c.pose_fit.and_then(|fit| fit.shape?.scale_sigma));
+    assert!(!matches!(reported, Ok(Some(sigma)) if sigma < 0.5), "{reported:?}");
 }

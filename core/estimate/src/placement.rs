@@ -8,7 +8,7 @@ use handeye_arm::{Arm, ArmError, JointKind};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 /// Why an arm cannot be placed by joint values and poses.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PlacementError {
     /// The joint values are of no use.

@@ -19,8 +19,8 @@ use crate::handeye::joint::{
 use crate::handeye::numbering::Turns;
 use crate::handeye::{HandEyeError, PosePair, determined};
 use crate::residuals::squared_residuals;
-use crate::uncertainty::widening::Widening;
-use crate::uncertainty::{quality, widening};
+use crate::uncertainty::overdispersion::Overdispersion;
+use crate::uncertainty::{overdispersion, quality};
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::progress::Work;
 use handeye_geometry::statistics::better_by_chance;
@@ -136,7 +136,7 @@ pub fn refine(
 }
 
 impl Refined {
-    /// Made anew from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views. The
+    /// Made again from where it ended, with the same views, unknowns and kinds of noise: `problem` is of those views. The
     /// error that may be stated is that of [`Self::stated`].
     pub fn again(&self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
         let mut next = self.clone();
@@ -260,7 +260,7 @@ fn bent(
 
 /// The print errors that the views of a screened estimate show, and the estimate with them. `problem` has the target as drawn.
 ///
-/// Where the target is bent as well, that is decided anew: points that are off within the plane look like a bend.
+/// Where the target is bent as well, that is decided again: points that are off within the plane look like a bend.
 fn printed(
     problem: &JointProblem<'_>,
     screened: &Screened,
@@ -363,7 +363,7 @@ pub struct Judged {
     pub heldout: Option<quality::HeldOut>,
     pub expected_heldout_rms_px: f64,
     pub robot_effect_px: f64,
-    pub widening: Widening,
+    pub widening: Overdispersion,
     pub error_curve: ErrorCurve,
     pub size: Option<TargetSize>,
 }
@@ -377,7 +377,7 @@ pub fn judge(
 ) -> Result<Judged, HandEyeError> {
     let heldout = quality::held_out(problem, solution, *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
-    let widening = widening::check(problem, solution, work.cancel)?;
+    let widening = overdispersion::check(problem, solution, work.cancel)?;
     let size = size::size(problem, solution, work.cancel)?;
     // Where the answer takes a wrong size for true its scatter is that of the size, and no reason to doubt another one.
     let size = if problem.free.scale { size.map(|size| size.widened(widening.factor)) } else { size };

@@ -32,16 +32,16 @@ pub(crate) fn is_resolved(metres: f64, radians: f64) -> bool {
 }
 
 /// A length \[m\] of the robot in words: what no robot resolves is below that.
-pub fn place_said(metres: f64) -> Value {
-    said(metres, PLACE_M, &|m| format!("{} mm", shown(m * 1e3, 3)))
+pub fn place_text(metres: f64) -> Value {
+    reported(metres, PLACE_M, &|m| format!("{} mm", shown(m * 1e3, 3)))
 }
 
 /// An angle \[rad\] likewise.
-pub fn angle_said(radians: f64) -> Value {
-    said(radians, ANGLE_RAD, &|rad| format!("{}°", shown(rad.to_degrees(), 3)))
+pub fn angle_text(radians: f64) -> Value {
+    reported(radians, ANGLE_RAD, &|rad| format!("{}°", shown(rad.to_degrees(), 3)))
 }
 
-fn said(value: f64, least: f64, number: &dyn Fn(f64) -> String) -> Value {
+fn reported(value: f64, least: f64, number: &dyn Fn(f64) -> String) -> Value {
     if value < least { text!("below {high}", high = number(least)).into() } else { number(value).into() }
 }
 
@@ -75,8 +75,8 @@ mod tests {
 
     #[test]
     fn what_no_robot_resolves_is_said_to_be_below_that_and_not_with_its_zeros() {
-        let said = |value: Value| value.say(English);
-        assert_eq!([said(place_said(3.96e-4)), said(angle_said(1e-3))], ["0.396 mm", "0.057°"]);
-        assert_eq!([said(place_said(0.0)), said(angle_said(1e-9))], ["below 0.010 mm", "below 0.001°"]);
+        let reported = |value: Value| value.in_language(English);
+        assert_eq!([reported(place_text(3.96e-4)), reported(angle_text(1e-3))], ["0.396 mm", "0.057°"]);
+        assert_eq!([reported(place_text(0.0)), reported(angle_text(1e-9))], ["below 0.010 mm", "below 0.001°"]);
     }
 }

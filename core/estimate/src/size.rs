@@ -8,9 +8,9 @@ use nalgebra::{SVector, Vector6};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::TargetSize;
-use super::claim::Alternative;
 use super::handeye::joint::{self, Free, JointProblem, JointSolution, SIZE_SIGMA};
 use super::handeye::{HandEyeError, determined};
+use super::stated_uncertainty::Alternative;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
 

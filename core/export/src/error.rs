@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use handeye_result::ResultProblem;
 
 /// Why a result was not exported.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ExportError {
     /// No format of that name.
@@ -104,7 +104,7 @@ pub enum ExportError {
         /// Their name.
         name: String,
     },
-    /// Where the optical frame is said to be is no place.
+    /// Where the optical frame is reported to be is no place.
     #[error(
         "the optical frame in the camera link, {translation_m:?} m and {rotation_xyzw:?} xyzw, is not a pose: it needs \
          finite numbers and a unit quaternion"

@@ -33,7 +33,7 @@ impl Default for Limits {
 }
 
 /// Why the reading was ended before its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 pub enum Spent {
     /// A person has cancelled it.
     #[error("cancelled")]

@@ -21,7 +21,7 @@ const OUTLIER: f64 = 4.0;
 const OUTLIER_FLOOR_M: f64 = 1e-3;
 
 /// Why depths are not usable.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum DepthError {
     /// The number of samples is not width × height.

@@ -132,7 +132,7 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> nalgebra::Rotation3<f64> {
 pub const ORTHONORMAL_TOLERANCE: f64 = 2e-3;
 
 /// Why a matrix is not a rotation.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum NotARotation {
     /// Its columns have other lengths or angles.

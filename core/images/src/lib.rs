@@ -34,7 +34,7 @@ const MAX_DECODED_BYTES: u64 = MAX_PIXELS * 8;
 const MAX_FILE_BYTES: u64 = MAX_DECODED_BYTES;
 
 /// Why an image file is of no use. The caller knows the file and names it.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ImageFileError {
     /// Not there, not a file, or not permitted.

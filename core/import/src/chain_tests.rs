@@ -133,6 +133,6 @@ fn of_more_values_than_the_arm_has_joints_the_first_are_taken_and_it_is_said() {
     let truth = ArmKind::Ur5e.arm().forward(&angles(2)).expect("a pose").matrix();
     let Numbers::Matrix(m) = recording.tracks[0].samples[2].numbers else { panic!("{:?}", recording.tracks) };
     assert!((m - truth).amax() < 1e-12, "torques are no angles");
-    let said = |text: &str| recording.beliefs.iter().any(|belief| belief.to_string().contains(text));
-    assert!(said("8 values a row: the first 6 are taken"), "{:?}", recording.beliefs);
+    let reported = |text: &str| recording.beliefs.iter().any(|belief| belief.to_string().contains(text));
+    assert!(reported("8 values a row: the first 6 are taken"), "{:?}", recording.beliefs);
 }

@@ -9,7 +9,7 @@ use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Why a recording cannot be read or a data set not be written. One line each: what, where, and what to do.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ImportError {
     /// The file system says no.

@@ -30,7 +30,7 @@ const IMAGES: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
 /// The files of a folder and of those in it, in natural order, as paths below it. Hidden ones are none. Of a file that was
 /// named, which comes last, it and what lies beside it.
 ///
-/// Links that lead out of the bounds are not among them; they are said in `warnings`.
+/// Links that lead out of the bounds are not among them; they are reported in `warnings`.
 pub(super) fn list(
     path: &Path,
     bounds: &Bounds,

@@ -114,10 +114,10 @@ fn the_same_poses_in_two_files_are_one_hypothesis_that_names_both() {
     assert!(judgement.hypotheses.iter().any(|h| names(h) != names(&judgement.hypotheses[0])));
 }
 
-/// A board that is said to be a seventh larger than it is leaves a few per cent of its distance, which a poor recording does, too.
+/// A board that is reported to be a seventh larger than it is leaves a few per cent of its distance, which a poor recording does, too.
 #[test]
 fn a_target_of_another_size_than_the_robot_has_seen_is_named_with_its_size() {
-    let said = |session: &Observations, factor: f64| {
+    let reported = |session: &Observations, factor: f64| {
         let TargetSpec::Chessboard(grid) = session.target else { panic!("a chessboard") };
         let target = TargetSpec::Chessboard(Grid { square_m: grid.square_m * factor, ..grid });
         Observations { target, ..session.clone() }
@@ -126,7 +126,7 @@ fn a_target_of_another_size_than_the_robot_has_seen_is_named_with_its_size() {
         let session = observed(mode, VIEWS, 4);
         let folder = table_folder(&session, Written::RpyRadM);
         let settings = Settings { mode: Some(mode), ..Settings::default() };
-        let (_, judgement) = judged(folder.path(), &said(&session, 1.15), &settings);
+        let (_, judgement) = judged(folder.path(), &reported(&session, 1.15), &settings);
         let best = &judgement.hypotheses[0];
         let fit = best.fit.as_ref().expect("a fit");
         assert!(fit.relative < 0.05 && fit.median_rad < 0.05, "by its error alone it would be taken: {fit:?}");
@@ -136,7 +136,7 @@ fn a_target_of_another_size_than_the_robot_has_seen_is_named_with_its_size() {
         let scale: f64 = named.expect("its size").parse().expect("a number");
         assert!((scale * 1.15 - 1.0).abs() < 0.01, "{scale}");
         // A print that is off by two per cent is for the calibration to find.
-        let (_, judgement) = judged(folder.path(), &said(&session, 1.02), &settings);
+        let (_, judgement) = judged(folder.path(), &reported(&session, 1.02), &settings);
         assert_eq!(judgement.verdict, Verdict::Decided, "{:#?}", judgement.hypotheses[0]);
     }
 }

@@ -213,11 +213,12 @@ fn layouts_of_other_repositories_give_every_image_its_pose() {
         write(folder.path(), &poses);
         let (recording, judgement) = judged(folder.path(), &session, &in_hand());
         let best = &judgement.hypotheses[0];
-        let said: Vec<_> = best.conventions(&recording).into_iter().map(|c| format!("{}={}", c.key, c.value)).collect();
-        assert_eq!(judgement.verdict, Verdict::Decided, "{name}: {said:?}");
+        let reported: Vec<_> =
+            best.conventions(&recording).into_iter().map(|c| format!("{}={}", c.key, c.value)).collect();
+        assert_eq!(judgement.verdict, Verdict::Decided, "{name}: {reported:?}");
         let pairs = written_pairs(&recording, best, &session);
-        assert_eq!(pairs.len(), VIEWS, "{name}: {said:?}");
-        assert!(pairs.iter().all(|(image, pose)| Some(*image) == *pose), "{name}: {pairs:?} {said:?}");
+        assert_eq!(pairs.len(), VIEWS, "{name}: {reported:?}");
+        assert!(pairs.iter().all(|(image, pose)| Some(*image) == *pose), "{name}: {pairs:?} {reported:?}");
     }
 }
 

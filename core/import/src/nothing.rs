@@ -10,23 +10,23 @@ use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Files of text that are told of.
-const MOST_TOLD: usize = 5;
+const MOST_REPORTED: usize = 5;
 /// Groups of files among which those are looked for, and the bytes of one: a person waits for the answer.
 const MOST_LOOKED_AT: usize = 200;
 const LARGEST: u64 = 1 << 20;
 
 /// Why nothing came of each of the files that are likeliest to have poses, and what to do with those that are not read.
 pub(super) fn reasons(reader: &Reader<'_>, files: &[PathBuf]) -> Vec<Text> {
-    let mut told: Vec<(Likely, Text)> = Vec::new();
+    let mut stated: Vec<(Likely, Text)> = Vec::new();
     for members in folder::groups(files, true).iter().take(MOST_LOOKED_AT) {
         let Some((first, _)) = members.first().filter(|_| !reader.budget.is_spent()) else { continue };
         let Some((likely, why)) = reason(first, reader) else { continue };
         let shown = folder::shown(members.iter().map(|(file, _)| file.as_path()));
         let name = if members.len() == 1 { first.display().to_string() } else { shown };
-        told.push((likely, text!("{name} has {why}", name = name, why = why)));
+        stated.push((likely, text!("{name} has {why}", name = name, why = why)));
     }
-    told.sort_by_key(|(likely, _)| *likely);
-    let mut reasons: Vec<Text> = told.into_iter().take(MOST_TOLD).map(|(_, why)| why).collect();
+    stated.sort_by_key(|(likely, _)| *likely);
+    let mut reasons: Vec<Text> = stated.into_iter().take(MOST_REPORTED).map(|(_, why)| why).collect();
     let not_read: BTreeMap<String, Text> =
         files.iter().filter_map(|file| not_read(file)).map(|why| (why.to_string(), why)).collect();
     reasons.extend(not_read.into_values());
@@ -80,7 +80,7 @@ mod tests {
     use handeye_geometry::progress::CancelToken;
     use std::fs;
 
-    fn said(files: &[(&str, &str)]) -> String {
+    fn reported(files: &[(&str, &str)]) -> String {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text) in files {
             fs::write(folder.path().join(name), text).expect("written");
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn every_file_that_was_looked_at_is_named_with_what_it_has() {
-        let why = said(&[
+        let why = reported(&[
             ("corners.txt", "1 2 3\n4 5 6\n7 8 9\n1 1 1\n"),
             ("angles.csv", "1,2,3,4,5,6,7\n2,2,3,4,5,6,7\n2,2,3,4,5,6,8\n"),
             ("pose.json", r#"{"position": [1, 2, 3], "orientation": [0, 0, 0, 1]}"#),
@@ -120,7 +120,7 @@ mod tests {
         let names: Vec<String> = "abcdefg".chars().map(|c| format!("{c}.txt")).collect();
         let mut files: Vec<(&str, &str)> = names.iter().map(|name| (name.as_str(), "nothing")).collect();
         files.extend([("poses.mat", "x"), ("poses.pkl", "x"), ("z.xlsx", "x")]);
-        let why = said(&files);
+        let why = reported(&files);
         assert_eq!(why.matches("no rows of numbers").count(), 5, "{why}");
         assert!(why.contains(".mat) are not read") && why.contains(".pkl) are not read"), "{why}");
         assert!(why.contains("csv, npz or json") && why.contains("spreadsheets"), "{why}");

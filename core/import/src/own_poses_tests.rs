@@ -39,8 +39,9 @@ fn seen(folder: &Path, session: &Observations) -> Vec<Isometry3<f64>> {
 }
 
 fn is_refused(judgement: &Judgement) -> bool {
-    let said = |h: &Hypothesis| h.contradictions.iter().any(|why| why.to_string().contains("the camera's own poses"));
-    judgement.verdict == Verdict::Unexplained && said(&judgement.hypotheses[0])
+    let reported =
+        |h: &Hypothesis| h.contradictions.iter().any(|why| why.to_string().contains("the camera's own poses"));
+    judgement.verdict == Verdict::Unexplained && reported(&judgement.hypotheses[0])
 }
 
 /// Another program counts from another corner or from the middle, lets y point up, and has another lens.

@@ -40,7 +40,7 @@ pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<
     recording.root.clone_from(&root);
     recording.streams = folder::streams(&root, &files, budget, &mut recording.warnings);
     budget.check().map_err(stopped)?;
-    recording.beliefs.extend(recording.streams.iter().map(Stream::said));
+    recording.beliefs.extend(recording.streams.iter().map(Stream::text));
     let mut reader = Reader::new(&root, recording, budget);
     let is_bag = |file: &PathBuf| of_ending(file).is_some_and(|(_, encoding)| encoding == Encoding::Bag);
     let (bags, others): (Vec<PathBuf>, Vec<PathBuf>) =
@@ -71,12 +71,12 @@ pub fn open_within(path: &Path, bounds: &Bounds, budget: &Budget<'_>) -> Result<
         text!("{count} poses in {name} are all the same", count = track.samples.len(), name = &track.name)
     });
     let beliefs = with_points
-        .map(Stream::said)
-        .chain(recording.tracks.iter().map(Track::said))
+        .map(Stream::text)
+        .chain(recording.tracks.iter().map(Track::text))
         .chain(still)
-        .chain(recording.joints.iter().map(JointSeries::said))
-        .chain(recording.cameras.iter().map(FoundCamera::said))
-        .chain(recording.targets.iter().map(FoundTarget::said));
+        .chain(recording.joints.iter().map(JointSeries::text))
+        .chain(recording.cameras.iter().map(FoundCamera::text))
+        .chain(recording.targets.iter().map(FoundTarget::text));
     let beliefs: Vec<Text> = beliefs.collect();
     recording.beliefs.extend(beliefs);
     Ok(recording)

@@ -89,7 +89,7 @@ pub struct Stream {
 
 impl Stream {
     /// What it is, in words.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         let (width, height) = self.size;
         let size = if self.size == (0, 0) {
             text!("no file says of which size")
@@ -173,7 +173,7 @@ impl Track {
     }
 
     /// What it is, in words.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         let joints = self.samples.iter().filter(|sample| !sample.joints.is_empty()).count();
         let kind = match self.samples.first().map(|sample| sample.numbers) {
             Some(Numbers::Angles(_)) | None => text!("six numbers"),
@@ -212,9 +212,9 @@ pub struct Sample {
 pub struct JointSeries {
     /// As it is told of.
     pub name: String,
-    /// Names of the joints in the order of the values, where they are said.
+    /// Names of the joints in the order of the values, where they are reported.
     pub joints: Vec<String>,
-    /// Of the values of revolute joints, where it is said.
+    /// Of the values of revolute joints, where it is reported.
     pub unit: Option<Known<AngleUnit>>,
     /// In the order of the file.
     pub samples: Vec<JointSample>,
@@ -222,7 +222,7 @@ pub struct JointSeries {
 
 impl JointSeries {
     /// What it is, in words.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         let names = if self.joints.is_empty() { String::new() } else { format!(" ({})", self.joints.join(", ")) };
         text!(
             "{count} rows of joint values in {name}{names}: arm=… makes poses of them",
@@ -261,7 +261,7 @@ pub struct Clocks {
 
 impl Clocks {
     /// How far they are apart.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         let (offset_ms, sigma_ms) = (self.offset.offset_s * 1e3, self.offset.sigma_s * 1e3);
         // Two digits of the standard deviation, and no more of the offset.
         let decimals = (1.0 - sigma_ms.max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
@@ -351,9 +351,9 @@ pub struct FoundTarget {
 
 impl FoundTarget {
     /// What it is, in words.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         let open = if self.is_id_open { text!(", which number of its family is not said") } else { Text::default() };
-        text!("a target in {file}: {target}{open}", file = &self.file, target = self.target.said(), open = open)
+        text!("a target in {file}: {target}{open}", file = &self.file, target = self.target.text(), open = open)
     }
 }
 
@@ -370,7 +370,7 @@ pub struct FoundCamera {
 
 impl FoundCamera {
     /// What it is, in words.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         text!("a camera in {file}: {why}", file = &self.name, why = Value::phrase(self.why))
     }
 }

@@ -59,7 +59,7 @@ impl Sight {
         Ok(Self { seen, covariances, target, intrinsics: views.intrinsics })
     }
 
-    /// From points that another program has found; the size of the images is said by the files or by a person.
+    /// From points that another program has found; the size of the images is reported by the files or by a person.
     ///
     /// # Errors
     /// A sentence, where nobody says the size, the points are not those of the target, or give no poses.
@@ -115,8 +115,8 @@ pub(super) fn recorded_corners(stream: &Stream, target: &TargetSpec) -> Result<V
 ///
 /// # Errors
 /// A sentence, where neither does, or points are beside the image.
-pub fn size_of_points(stream: &Stream, said: Option<(u32, u32)>) -> Result<(u32, u32), Text> {
-    let size = said.or((stream.size != (0, 0)).then_some(stream.size));
+pub fn size_of_points(stream: &Stream, reported: Option<(u32, u32)>) -> Result<(u32, u32), Text> {
+    let size = reported.or((stream.size != (0, 0)).then_some(stream.size));
     let (width, height) = size.ok_or_else(|| {
         text!("no file says how large the images were: --set image_size=WIDTHxHEIGHT does, in pixels")
     })?;

@@ -221,8 +221,9 @@ fn a_written_import_is_a_data_set_with_the_same_poses_to_nine_digits() {
             assert!(metres < 1e-9 && radians < 1e-9, "{metres} {radians}");
         }
         let text = fs::read_to_string(out.join("dataset.toml")).expect("text");
-        for said in ["mode = eye_in_hand", "given with --set", "rotation = euler_zyx_123", "by the data: it leaves"] {
-            assert!(text.contains(said), "{said:?} in\n{text}");
+        for reported in ["mode = eye_in_hand", "given with --set", "rotation = euler_zyx_123", "by the data: it leaves"]
+        {
+            assert!(text.contains(reported), "{reported:?} in\n{text}");
         }
         let again = write::write(&plan, &out, |_, _| ()).expect_err("there is something");
         assert!(matches!(again, ImportError::OutNotEmpty(_)), "{again}");

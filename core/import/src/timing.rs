@@ -58,7 +58,7 @@ pub fn timed(
             None => motion.role != Role::Target,
         };
         for motion in recording.motions.iter().filter(is_wanted) {
-            match told(motion, &seen, sight, first_ns, settings, cancel) {
+            match stated(motion, &seen, sight, first_ns, settings, cancel) {
                 Ok(offset) => found.push((motion, offset)),
                 Err(why) => {
                     refusal =
@@ -67,7 +67,7 @@ pub fn timed(
             }
         }
         let Some((motion, offset)) = found.first() else {
-            // Without a robot there is nothing to be timed by, which is said later.
+            // Without a robot there is nothing to be timed by, which is reported later.
             let Some(refusal) = refusal else { continue };
             if !stood(recording, &mut out, sights, i, &refusal) {
                 return Err(refusal);
@@ -82,7 +82,7 @@ pub fn timed(
             out.tracks.extend(track(motion, stream, offset, &chosen, first_ns));
             let (images, poses) = (stream.name.clone(), motion.name.clone());
             let clocks = Clocks { images, poses, offset: *offset, count: seen.len() };
-            out.beliefs.push(clocks.said());
+            out.beliefs.push(clocks.text());
             out.clocks.push(clocks);
         }
         let kept = |index: &usize| stream.images[*index].clone();
@@ -146,7 +146,7 @@ fn anchor_from_mount(motion: &Motion, class: Direction, first_ns: i64) -> Vec<(f
 }
 
 /// The offset under the place of the camera and the direction of the poses that explain what was seen.
-fn told(
+fn stated(
     motion: &Motion,
     seen: &[Seen],
     sight: &Sight,
@@ -157,7 +157,7 @@ fn told(
     let about_s = settings.clock_offset_s.unwrap_or(0.0);
     let camera: Vec<(f64, Pose<Camera, Target>)> =
         seen.iter().map(|(_, time_s, pose)| (time_s + about_s, Pose::from_isometry(*pose))).collect();
-    let mut told: Vec<(f64, ClockOffset)> = Vec::new();
+    let mut stated: Vec<(f64, ClockOffset)> = Vec::new();
     let mut refusal = None;
     for class in classes(motion, settings) {
         let robot = anchor_from_mount(motion, class, first_ns);
@@ -172,12 +172,12 @@ fn told(
                 let pairs: Vec<PosePair> =
                     subset::spread(pairs.len(), MOST_COMPARED).into_iter().map(|i| pairs[i]).collect();
                 let left = agreement(&sight.target.outer, &pairs, true).map_or(f64::INFINITY, |found| found.median_m);
-                told.push((left, ClockOffset { offset_s: offset.offset_s + about_s, ..offset }));
+                stated.push((left, ClockOffset { offset_s: offset.offset_s + about_s, ..offset }));
             }
         }
     }
-    told.sort_by(|a, b| a.0.total_cmp(&b.0));
-    match (told.as_slice(), refusal) {
+    stated.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match (stated.as_slice(), refusal) {
         ([(_, best)], _) => Ok(*best),
         ([(left, best), (other_left, other)], _) => {
             let apart_s = (best.offset_s - other.offset_s).abs();

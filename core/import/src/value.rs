@@ -124,8 +124,8 @@ pub(super) fn json(text: &str) -> Result<Value, Text> {
 
 /// Why serde reads no further. What is ours of it comes back with its place.
 fn refused(error: &serde_json::Error) -> Text {
-    let said = error.to_string();
-    let ours = [too_many(), too_deep()].into_iter().find(|why| said.starts_with(&why.to_string()));
+    let reported = error.to_string();
+    let ours = [too_many(), too_deep()].into_iter().find(|why| reported.starts_with(&why.to_string()));
     ours.filter(|_| error.line() > 0).map_or_else(
         || foreign(error),
         |why| text!("{why} at line {line} column {column}", why = why, line = error.line(), column = error.column()),

@@ -195,7 +195,7 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
 }
 
 /// Plans the folder of images alone, to calibrate the camera by itself: those that a person named, or else those of the stream
-/// that has most; what is not taken is said. A lens that files describe is where the estimate starts, with its model. `None` where
+/// that has most; what is not taken is reported. A lens that files describe is where the estimate starts, with its model. `None` where
 /// there are no images; depth images are none.
 pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetSpec, String)) -> Option<Plan> {
     let photographs = (0..recording.streams.len()).filter(|i| recording.has_photographs(*i));
@@ -388,18 +388,18 @@ pub fn provenance(key: &str, value: &str, h: &Hypothesis, known: &Context<'_>) -
     let (own, own_said) = left(h).unwrap_or((f64::INFINITY, "nothing".into()));
     let other = known.judgement.hypotheses.iter().filter_map(|other| {
         let convention = other.conventions(known.recording).into_iter().find(|c| c.key == key)?;
-        let (relative, said) = left(other)?;
+        let (relative, reported) = left(other)?;
         let why = other.contradictions.first().cloned();
-        (convention.value != value).then_some((relative, said, convention.value, why))
+        (convention.value != value).then_some((relative, reported, convention.value, why))
     });
     match other.min_by(|a, b| a.0.total_cmp(&b.0)) {
         None => "nothing else is possible with these files, or explains the views nearly as well".into(),
-        Some((relative, said, value, _)) if rules_out(own, relative) => {
-            format!("by the data: it leaves {own_said}, {value} leaves {said}")
+        Some((relative, reported, value, _)) if rules_out(own, relative) => {
+            format!("by the data: it leaves {own_said}, {value} leaves {reported}")
         }
         Some((.., value, Some(why))) => format!("by the data: {value} is contradicted: {why}"),
-        Some((_, said, value, None)) => {
-            format!("not decided by the data: it leaves {own_said}, {value} leaves {said}")
+        Some((_, reported, value, None)) => {
+            format!("not decided by the data: it leaves {own_said}, {value} leaves {reported}")
         }
     }
 }

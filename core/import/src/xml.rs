@@ -7,7 +7,7 @@ use super::value::{MAX_DEPTH, MAX_VALUES, Value, number};
 const OTHERS: [&str; 7] = ["mujoco", "sdf", "world", "package", "launch", "COLLADA", "svg"];
 
 /// A document of XML, within bounds: its parser compares every attribute of an element with all others of it, and keeps the names
-/// of spaces for every element anew.
+/// of spaces for every element again.
 fn parsed(text: &str) -> Result<roxmltree::Document<'_>, String> {
     const MOST_ATTRIBUTES: usize = 256;
     const MOST_SPACES: usize = 64;

@@ -19,7 +19,7 @@ const SPEED_SAMPLES: usize = 320;
 const ROUNDING_M: f64 = 1e-9;
 
 /// What is too near.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum Contact {
     /// Something that stands around.

@@ -88,7 +88,7 @@ pub struct PlannedView {
 }
 
 /// Why there are not enough views.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PlanError {
     /// Fewer views than asked for fit the cell.

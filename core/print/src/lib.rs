@@ -26,7 +26,7 @@ pub use sheet::{Page, Sheet, Text};
 use handeye_geometry::targets::{BadTarget, TargetSpec};
 
 /// Why a target cannot be printed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PrintError {
     /// A number of the target is out of range.

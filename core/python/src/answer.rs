@@ -81,11 +81,11 @@ fn document(
     method: Method,
     options: Options,
 ) -> CalibrationResult {
-    let mut said = solve_options(method, options, &observations.observed.target);
+    let mut reported = solve_options(method, options, &observations.observed.target);
     if !observations.target_is_known {
-        said.insert(TARGET_OPTION.to_owned(), Value::Null);
+        reported.insert(TARGET_OPTION.to_owned(), Value::Null);
     }
-    let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), None, said);
+    let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), None, reported);
     result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
     result
 }

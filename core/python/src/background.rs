@@ -14,7 +14,7 @@ use crate::error::Failure;
 const LOOK: Duration = Duration::from_millis(50);
 
 /// What the working thread says.
-enum Said<T> {
+enum WorkerMessage<T> {
     Progress(Progress),
     Done(Result<T, Failure>),
 }
@@ -25,33 +25,33 @@ enum Said<T> {
 /// That of the work; `KeyboardInterrupt`, or what `told` raised, after which the work was cancelled.
 pub fn run<T: Send>(
     py: Python<'_>,
-    told: Option<&Bound<'_, PyAny>>,
+    stated: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(Work<'_>) -> Result<T, Failure> + Send,
 ) -> Result<T, Failure> {
     let cancel = CancelToken::default();
-    let wants_progress = told.is_some();
+    let wants_progress = stated.is_some();
     thread::scope(|scope| {
         let (sender, mut receiver) = channel();
         let token = cancel.clone();
         let worker = scope.spawn(move || {
             // Nobody listens any more only when nobody waits any more.
-            let say = |said| drop(sender.send(said));
+            let say = |reported| drop(sender.send(reported));
             let progress = |now: Progress| {
                 if wants_progress {
-                    say(Said::Progress(now));
+                    say(WorkerMessage::Progress(now));
                 }
             };
-            say(Said::Done(work(Work { cancel: &token, progress: &progress })));
+            say(WorkerMessage::Done(work(Work { cancel: &token, progress: &progress })));
         });
         let mut interrupted = None;
         loop {
-            let said;
+            let reported;
             // It may be on one thread at a time only, so that it is handed over and back.
-            (said, receiver) = py.detach(move || (receiver.recv_timeout(LOOK), receiver));
-            let heard = match said {
-                Ok(Said::Done(result)) => return interrupted.map_or(result, |error: PyErr| Err(error.into())),
-                Ok(Said::Progress(now)) => {
-                    told.map_or(Ok(()), |told| told.call1((now.stage.label(), now.fraction())).map(drop))
+            (reported, receiver) = py.detach(move || (receiver.recv_timeout(LOOK), receiver));
+            let heard = match reported {
+                Ok(WorkerMessage::Done(result)) => return interrupted.map_or(result, |error: PyErr| Err(error.into())),
+                Ok(WorkerMessage::Progress(now)) => {
+                    stated.map_or(Ok(()), |stated| stated.call1((now.stage.label(), now.fraction())).map(drop))
                 }
                 Err(RecvTimeoutError::Timeout) => py.check_signals(),
                 Err(RecvTimeoutError::Disconnected) => {

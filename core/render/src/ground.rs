@@ -1,11 +1,11 @@
 //! The short way for floors and tables, which fill most of most images.
 //!
-//! The same colours as by [`super::shade::Coat`], but the place on the surface comes from linear forms of the ray, and
+//! The same colours as by [`super::shade::SurfaceShade`], but the place on the surface comes from linear forms of the ray, and
 //! the averaging width of the pattern is that of the middle of a run of pixels instead of each pixel's own.
 
 use super::Finish;
 use super::rays::Ray;
-use super::shade::{Coat, Lamp, misty};
+use super::shade::{Lamp, SurfaceShade, misty};
 use super::shapes::{Facet, Vec3, dot, scale_add};
 use super::texture::{WoodAt, tiles};
 
@@ -31,7 +31,7 @@ pub(super) struct Ground {
 
 impl Ground {
     /// `None` where colours need the long way.
-    pub fn new(facet: &Facet, coat: &Coat, lamp: &Lamp) -> Option<Self> {
+    pub fn new(facet: &Facet, coat: &SurfaceShade, lamp: &Lamp) -> Option<Self> {
         if !(coat.is_ground() && lamp.is_uniform()) {
             return None;
         }

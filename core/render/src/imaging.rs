@@ -39,7 +39,7 @@ pub(super) fn develop(colours: Vec<f32>, width: u32, height: u32, imaging: &Imag
     RgbImage::from_raw(width, height, bytes).unwrap_or_default()
 }
 
-/// Adds noise to all depths below the far plane and keeps them between the planes; the others become what is said where
+/// Adds noise to all depths below the far plane and keeps them between the planes; the others become what is reported where
 /// nothing is.
 pub(super) fn disturb(depths_m: &mut [f32], near_m: f64, far_m: f64, imaging: &Imaging, seed: u64) {
     add_noise(depths_m, near_m, far_m, imaging, seed);

@@ -68,7 +68,7 @@ impl Lamp {
 
 /// The look of a solid, ready for points in camera coordinates.
 #[derive(Debug, Clone)]
-pub(super) struct Coat {
+pub(super) struct SurfaceShade {
     colour: [f32; 3],
     finish: Finish,
     shape_from_camera: [Vec3; 3],
@@ -106,7 +106,7 @@ impl Spot {
     }
 }
 
-impl Coat {
+impl SurfaceShade {
     /// One colour without gloss or texture.
     pub fn matt(colour: [f32; 3]) -> Self {
         Self { colour, finish: Finish::Matt, shape_from_camera: [[0.0; 3]; 3], origin: [0.0; 3], fade: None }

@@ -17,7 +17,7 @@ const BARELY: f64 = 1e-3;
 
 /// Something that stands in the light, in camera coordinates.
 #[derive(Debug, Clone)]
-pub(super) struct Caster {
+pub(super) struct ShadowCaster {
     form: Form,
     /// The solid that it stands for; it casts no shadow on itself. `None` for the board.
     pub owner: Option<usize>,
@@ -31,7 +31,7 @@ enum Form {
     Plate { middle: Vec3, u: Vec3, v: Vec3, normal: Vec3, half: [f64; 2] },
 }
 
-impl Caster {
+impl ShadowCaster {
     /// The stand-in of a solid; `None` for what casts no shadow.
     pub fn of_solid(owner: usize, solid: &Solid, camera_from_shape: &Isometry3<f64>) -> Option<Self> {
         let form = match solid.shape {
@@ -96,7 +96,7 @@ impl Caster {
 
 /// Part of the lamp that reaches a point past all casters but its own solid.
 pub(super) fn sunlit<'a>(
-    casters: impl Iterator<Item = &'a Caster>,
+    casters: impl Iterator<Item = &'a ShadowCaster>,
     receiver: Option<usize>,
     point: &Vec3,
     towards: &Vec3,

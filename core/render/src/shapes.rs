@@ -195,7 +195,7 @@ impl Ball {
 
 /// The side of a cylinder between two ends.
 #[derive(Debug, Clone)]
-pub(super) struct Mantle {
+pub(super) struct CylinderSide {
     start: Vec3,
     axis: Vec3,
     length: f64,
@@ -207,7 +207,7 @@ pub(super) struct Mantle {
     bounds: Vec<Ball>,
 }
 
-impl Mantle {
+impl CylinderSide {
     fn new(start: &Vector3<f64>, end: &Vector3<f64>, radius: f64) -> Option<Self> {
         let along = end - start;
         let length = along.norm();
@@ -249,7 +249,7 @@ impl Mantle {
 pub(super) enum Surface {
     Facet(Facet),
     Ball(Ball),
-    Mantle(Mantle),
+    CylinderSide(CylinderSide),
 }
 
 impl Surface {
@@ -258,7 +258,7 @@ impl Surface {
         match self {
             Self::Facet(facet) => facet.hit(d),
             Self::Ball(ball) => ball.hit(d),
-            Self::Mantle(mantle) => mantle.hit(d),
+            Self::CylinderSide(mantle) => mantle.hit(d),
         }
     }
 
@@ -267,7 +267,7 @@ impl Surface {
         match self {
             Self::Facet(facet) => facet.normal,
             Self::Ball(ball) => scaled(&scale_add(-1.0, &ball.centre, point), 1.0 / ball.radius),
-            Self::Mantle(mantle) => {
+            Self::CylinderSide(mantle) => {
                 let from_start = scale_add(-1.0, &mantle.start, point);
                 let height = dot(&from_start, &mantle.axis);
                 scaled(&scale_add(-height, &mantle.axis, &from_start), 1.0 / mantle.radius)
@@ -282,7 +282,7 @@ impl Surface {
             Self::Ball(ball) => rays
                 .may_touch_ball(&ball.centre, ball.radius)
                 .then(|| Reach { nearest: ball.centre[2] - ball.radius, covers_within: None }),
-            Self::Mantle(mantle) => mantle
+            Self::CylinderSide(mantle) => mantle
                 .bounds
                 .iter()
                 .filter(|ball| rays.may_touch_ball(&ball.centre, ball.radius))
@@ -309,7 +309,13 @@ pub(super) fn faces(solid: &Solid, camera_from_shape: &Isometry3<f64>) -> Vec<Ve
         }
         Shape::Capsule { a, b, radius } if radius > 0.0 && distance_to_segment(&camera, &a, &b) > radius => {
             let ends = [Surface::Ball(Ball::new(&put(&a), radius)), Surface::Ball(Ball::new(&put(&b), radius))];
-            vec![Mantle::new(&put(&a), &put(&b), radius).map(Surface::Mantle).into_iter().chain(ends).collect()]
+            vec![
+                CylinderSide::new(&put(&a), &put(&b), radius)
+                    .map(Surface::CylinderSide)
+                    .into_iter()
+                    .chain(ends)
+                    .collect(),
+            ]
         }
         Shape::Box { half_extents: half } => {
             let sides = (0..3).filter(|&i| camera[i].abs() > half[i]);
@@ -325,7 +331,10 @@ pub(super) fn faces(solid: &Solid, camera_from_shape: &Isometry3<f64>) -> Vec<Ve
             let end = |sign: f64| Point3::new(0.0, 0.0, sign * half_height);
             let mut all = Vec::new();
             if camera.x.hypot(camera.y) > radius {
-                all.extend(Mantle::new(&put(&end(-1.0)), &put(&end(1.0)), radius).map(|m| vec![Surface::Mantle(m)]));
+                all.extend(
+                    CylinderSide::new(&put(&end(-1.0)), &put(&end(1.0)), radius)
+                        .map(|m| vec![Surface::CylinderSide(m)]),
+                );
             }
             if camera.z.abs() > half_height {
                 let (u, v) = (turn(Vector3::x() * radius), turn(Vector3::y() * radius));

@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::board::{Footprint, Pattern};
 use super::ground::Ground;
 use super::rays::Ray;
-use super::shade::{Coat, Lamp, Spot};
-use super::shadow::{self, Caster};
+use super::shade::{Lamp, Spot, SurfaceShade};
+use super::shadow::{self, ShadowCaster};
 use super::shapes::{Facet, Rays, Surface, Vec3, dot, faces, scale_add};
 use super::{BoardSurface, Imaging, PrintErrors, RenderScene, Sampling};
 
@@ -35,9 +35,9 @@ struct Piece {
 enum Paint {
     /// One colour, light included.
     Flat([f32; 3]),
-    Coat(Coat),
+    SurfaceShade(SurfaceShade),
     /// A coat with its short way.
-    Ground(Coat, Ground),
+    Ground(SurfaceShade, Ground),
     Print(Print),
 }
 
@@ -82,7 +82,7 @@ pub(super) struct TileContent {
 #[derive(Debug)]
 pub(super) struct Stage {
     pieces: Vec<Piece>,
-    casters: Vec<Caster>,
+    casters: Vec<ShadowCaster>,
     lamp: Lamp,
     background: [f32; 3],
     near_m: f64,
@@ -106,11 +106,11 @@ impl Stage {
         stage.add_board(&scene.board, &camera_from_world, imaging.sampling);
         for (owner, solid) in scene.solids.iter().enumerate() {
             let camera_from_shape = camera_from_world * solid.world_from_shape;
-            let coat = Coat::new(solid, &camera_from_shape, far_m);
+            let coat = SurfaceShade::new(solid, &camera_from_shape, far_m);
             for face in faces(solid, &camera_from_shape) {
                 stage.add_face(face, owner, &coat);
             }
-            stage.casters.extend(Caster::of_solid(owner, solid, &camera_from_shape));
+            stage.casters.extend(ShadowCaster::of_solid(owner, solid, &camera_from_shape));
         }
         stage
     }
@@ -119,28 +119,28 @@ impl Stage {
         let camera_from_target = camera_from_world * board.world_from_target;
         let half = |count: usize| 0.5 * (count as f64 - 1.0) * board.square_m;
         let middle = Point3::new(half(board.columns), half(board.rows), 0.0);
-        self.casters.push(Caster::of_board(board, &middle, &camera_from_target));
+        self.casters.push(ShadowCaster::of_board(board, &middle, &camera_from_target));
         self.pieces.extend(sheet(board, &middle, &camera_from_target, &self.lamp, sampling));
     }
 
-    fn add_face(&mut self, surfaces: Vec<Surface>, owner: usize, coat: &Coat) {
+    fn add_face(&mut self, surfaces: Vec<Surface>, owner: usize, coat: &SurfaceShade) {
         let face = self.pieces.last().map_or(BACKGROUND, |piece| piece.face).saturating_add(1);
         for surface in surfaces {
             let paint = match &surface {
                 Surface::Facet(facet) => self.facet_paint(facet, coat),
-                Surface::Ball(_) | Surface::Mantle(_) => Paint::Coat(coat.clone()),
+                Surface::Ball(_) | Surface::CylinderSide(_) => Paint::SurfaceShade(coat.clone()),
             };
             self.pieces.push(Piece { surface, face, paint, lead: 1.0, owner: Some(owner) });
         }
     }
 
-    fn facet_paint(&self, facet: &Facet, coat: &Coat) -> Paint {
+    fn facet_paint(&self, facet: &Facet, coat: &SurfaceShade) -> Paint {
         if let Some(flat) = coat.flat(&self.lamp, &facet.normal) {
             Paint::Flat(flat)
         } else if let Some(ground) = Ground::new(facet, coat, &self.lamp) {
             Paint::Ground(coat.clone(), ground)
         } else {
-            Paint::Coat(coat.clone())
+            Paint::SurfaceShade(coat.clone())
         }
     }
 
@@ -177,12 +177,14 @@ impl Stage {
         let grounds = candidates.iter().filter_map(|candidate| {
             let piece = &self.pieces[candidate.piece as usize];
             match (&piece.surface, &piece.paint) {
-                (Surface::Facet(facet), Paint::Coat(coat) | Paint::Ground(coat, _)) if coat.is_ground() => Some(facet),
+                (Surface::Facet(facet), Paint::SurfaceShade(coat) | Paint::Ground(coat, _)) if coat.is_ground() => {
+                    Some(facet)
+                }
                 _ => None,
             }
         });
         let patches: Vec<(Vec3, f64)> = grounds.map(|facet| rays.patch(facet.inverse_depth(), self.far_m)).collect();
-        let darkens = |caster: &Caster| {
+        let darkens = |caster: &ShadowCaster| {
             patches.iter().any(|(middle, radius)| caster.may_darken(middle, *radius, &self.lamp.towards(middle)))
         };
         let indices = self.casters.iter().enumerate().filter(|(_, caster)| darkens(caster));
@@ -250,7 +252,7 @@ impl Stage {
                 }
                 return Some(piece.face);
             }
-            Paint::Coat(_) => return None,
+            Paint::SurfaceShade(_) => return None,
         };
         let sunlit = |point: &Vec3| self.sunlit(sight, piece, point, &ground.towards);
         let shadows: Option<&dyn Fn(&Vec3) -> f32> = if sight.casters.is_empty() { None } else { Some(&sunlit) };
@@ -297,7 +299,7 @@ impl Stage {
         let coat = match &piece.paint {
             Paint::Flat(colour) => return *colour,
             Paint::Print(print) => return print.colour(ray, &piece.surface, &self.lamp),
-            Paint::Coat(coat) | Paint::Ground(coat, _) => coat,
+            Paint::SurfaceShade(coat) | Paint::Ground(coat, _) => coat,
         };
         let direction = ray.direction();
         let point = direction.map(|c| c * hit.depth);
@@ -350,8 +352,8 @@ fn sheet(
             white: board.white,
         })
     } else {
-        let coat = Coat::matt(board.back);
-        coat.flat(lamp, &facet.normal).map_or_else(|| Paint::Coat(coat), Paint::Flat)
+        let coat = SurfaceShade::matt(board.back);
+        coat.flat(lamp, &facet.normal).map_or_else(|| Paint::SurfaceShade(coat), Paint::Flat)
     };
     Some(Piece { surface: Surface::Facet(facet), face: BACKGROUND + 1, paint, lead: SHEET_LEAD, owner: None })
 }

@@ -14,7 +14,7 @@ const UNIT_TOLERANCE: f64 = 1e-6;
 const SYMMETRY_TOLERANCE: f64 = 1e-6;
 
 /// A value that a result must not have.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("{at} {problem}")]
 #[non_exhaustive]
 pub struct BadResult {

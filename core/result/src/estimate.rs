@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use handeye_estimate::diagnose::record::FindingRecord;
-use handeye_estimate::handeye::joint::RobotField;
+use handeye_estimate::handeye::joint::PoseDependentError;
 
 /// Details of a joint estimate. Of a camera alone there are the target as found, and degrees of freedom and widening of the
 /// standard deviations of its intrinsics.
@@ -28,7 +28,7 @@ pub struct EstimateDetails {
     /// Noise that all corners of a view share, pixels; zero where the data ask for none.
     pub view_sigma_px: Option<f64>,
     /// By how much the covariances were widened, because the data scatter more than the noise levels say.
-    pub widening: Option<WideningRecord>,
+    pub widening: Option<OverdispersionRecord>,
     /// The target where it was found not to be the one drawn.
     pub board: Option<BoardEstimate>,
     /// The size of the target by the robot's motion, which the answer does not count on unless `board` has it.
@@ -38,7 +38,7 @@ pub struct EstimateDetails {
     pub joint_offsets: Option<JointOffsetsEstimate>,
     /// Errors of the robot that depend on where it stands, where the data show them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub robot_field: Option<RobotFieldEstimate>,
+    pub robot_field: Option<PoseDependentErrorEstimate>,
     /// What the points of the target are off their drawing, where the data show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub print: Option<PrintEstimate>,
@@ -52,7 +52,7 @@ pub struct EstimateDetails {
 
 /// A widened covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct WideningRecord {
+pub struct OverdispersionRecord {
     /// By how much standard deviations were widened, at least 1.
     pub factor: f64,
     /// Which evidence asked for it, or which was looked at in vain.
@@ -150,7 +150,7 @@ pub struct JointOffsetsEstimate {
 /// radians, both in the axes of the tip. Where `p` is farther from the origin than `reach_m` nothing is known, and
 /// `p - origin_m` is shortened to that length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RobotFieldEstimate {
+pub struct PoseDependentErrorEstimate {
     /// Where the field is zero, in the base, metres: the middle of the session's tip positions.
     pub origin_m: [f64; 3],
     /// How far from there the session went, metres.
@@ -168,12 +168,12 @@ pub struct RobotFieldEstimate {
     pub heldout_rms_px: Option<f64>,
 }
 
-impl RobotFieldEstimate {
+impl PoseDependentErrorEstimate {
     /// The field, to correct reported poses by.
-    pub fn field(&self) -> RobotField {
+    pub fn field(&self) -> PoseDependentError {
         let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
         let (position, orientation) = (matrix(&self.position_slopes), matrix(&self.orientation_slopes_rad_per_m));
-        RobotField::new(self.origin_m.into(), self.reach_m, &position, &orientation)
+        PoseDependentError::new(self.origin_m.into(), self.reach_m, &position, &orientation)
     }
 }
 

@@ -10,7 +10,7 @@ use handeye_files::json_text;
 use handeye_wording::one_line;
 
 /// Why a result file could not be read or written.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[error("{file}: {problem}", file = file.display())]
 #[non_exhaustive]
 pub struct ResultError {
@@ -28,7 +28,7 @@ impl ResultError {
 }
 
 /// What is wrong with a result.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ResultProblem {
     /// The file system does not give it.

@@ -37,8 +37,8 @@ use handeye_geometry::frames::{Camera, Frame, Mount, Pose};
 
 pub use check::BadResult;
 pub use estimate::{
-    BoardEstimate, DepthsEstimate, EstimateDetails, Findings, JointOffsetsEstimate, PrintEstimate,
-    ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate, WideningRecord,
+    BoardEstimate, DepthsEstimate, EstimateDetails, Findings, JointOffsetsEstimate, OverdispersionRecord,
+    PoseDependentErrorEstimate, PrintEstimate, ResidualDistortionEstimate, TargetSizeEstimate,
 };
 pub use file::{ResultError, ResultProblem};
 pub use of_calibration::{TARGET_OPTION, solve_options};

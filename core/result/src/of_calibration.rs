@@ -6,12 +6,12 @@ use nalgebra::Matrix3;
 
 use super::{
     BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate,
-    MethodRecord, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate, RobotFieldEstimate,
-    TargetSizeEstimate, ViewRecord, ViewRecordStatus, WideningRecord,
+    MethodRecord, OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Provenance, Quality,
+    ResidualDistortionEstimate, TargetSizeEstimate, ViewRecord, ViewRecordStatus,
 };
 use handeye_estimate::diagnose::Calibration;
-use handeye_estimate::handeye::joint::{PrintErrors, RobotField, ShownDistortion};
-use handeye_estimate::uncertainty::widening::Evidence;
+use handeye_estimate::handeye::joint::{PoseDependentError, PrintErrors, ShownDistortion};
+use handeye_estimate::uncertainty::overdispersion::Evidence;
 use handeye_estimate::{
     CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
 };
@@ -83,7 +83,7 @@ fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {
         degrees_of_freedom: Some(joint.small_sample.degrees_of_freedom).filter(|v| v.is_finite()),
         region_scale: Some(joint.small_sample.scale),
         view_sigma_px: Some(joint.noise.view_px),
-        widening: Some(WideningRecord {
+        widening: Some(OverdispersionRecord {
             factor: joint.widening.factor.sqrt(),
             by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
             lens_factor: Some(joint.widening.lens.sqrt()).filter(|factor| *factor > 1.0),
@@ -130,7 +130,7 @@ fn of_camera(fit: &CameraFit) -> EstimateDetails {
     let widened = fit.times > 1.0;
     EstimateDetails {
         degrees_of_freedom: Some(fit.degrees_of_freedom),
-        widening: Some(WideningRecord {
+        widening: Some(OverdispersionRecord {
             factor: fit.times.max(1.0),
             by: if widened { Evidence::Jackknife.name() } else { "none" }.to_owned(),
             lens_factor: None,
@@ -140,9 +140,9 @@ fn of_camera(fit: &CameraFit) -> EstimateDetails {
     }
 }
 
-fn robot_field(field: &RobotField, joint: &JointFit) -> RobotFieldEstimate {
+fn robot_field(field: &PoseDependentError, joint: &JointFit) -> PoseDependentErrorEstimate {
     let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]);
-    RobotFieldEstimate {
+    PoseDependentErrorEstimate {
         origin_m: field.origin_m().into(),
         reach_m: field.reach_m(),
         position_slopes: rows(field.position_slopes()),

@@ -5,8 +5,8 @@ use serde_json::json;
 
 use super::{
     BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate,
-    MethodRecord, PrintEstimate, Quality, ResidualDistortionEstimate, RobotFieldEstimate, TargetSizeEstimate,
-    TruthComparison, VerificationSummary, ViewRecord, ViewRecordStatus, WideningRecord,
+    MethodRecord, OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Quality, ResidualDistortionEstimate,
+    TargetSizeEstimate, TruthComparison, VerificationSummary, ViewRecord, ViewRecordStatus,
 };
 use handeye_estimate::handeye::HandEye;
 use handeye_geometry::camera::{Distortion, Intrinsics};
@@ -63,7 +63,7 @@ pub fn golden() -> CalibrationResult {
         degrees_of_freedom: Some(31.5),
         region_scale: Some(0.97),
         view_sigma_px: Some(0.0),
-        widening: Some(WideningRecord { factor: 1.4, by: "neighbours".to_owned(), lens_factor: Some(2.0) }),
+        widening: Some(OverdispersionRecord { factor: 1.4, by: "neighbours".to_owned(), lens_factor: Some(2.0) }),
         target_size: Some(TargetSizeEstimate { true_over_stated: 1.001, sigma: 0.002, determined: true }),
         board: Some(BoardEstimate {
             warp_mm: [0.16, -0.03],
@@ -78,7 +78,7 @@ pub fn golden() -> CalibrationResult {
             heldout_after_px: 1.0,
             accepted: true,
         }),
-        robot_field: Some(RobotFieldEstimate {
+        robot_field: Some(PoseDependentErrorEstimate {
             origin_m: [0.4, -0.1, 0.5],
             reach_m: 0.3,
             position_slopes: [[1e-3, 0.0, -2e-3], [0.0, 5e-4, 0.0], [0.0; 3]],

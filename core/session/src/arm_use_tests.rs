@@ -109,8 +109,8 @@ fn a_capture_out_of_use_whose_joints_are_of_another_pose_has_nothing_to_tell() {
     let id = store.add_capture(&wrong).expect("add");
     assert!(matches!(store.document().tip_by_joint(), Err(PlacementError::Foreign { view: 5, .. })));
     store.apply(Edit::SetExcluded { ids: vec![id], excluded: true }).expect("exclude");
-    let told = store.document().tip_by_joint().expect("the others belong together");
-    assert_eq!(told.into_keys().map(|id| id.0).collect::<Vec<_>>(), [1, 2, 3, 4]);
+    let reported = store.document().tip_by_joint().expect("the others belong together");
+    assert_eq!(reported.into_keys().map(|id| id.0).collect::<Vec<_>>(), [1, 2, 3, 4]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::edit_error::EditError;
 
 /// What is wrong, and with which file or folder.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[error("{file}: {problem}", file = file.display())]
 #[non_exhaustive]
 pub struct SessionError {
@@ -40,7 +40,7 @@ impl SessionError {
 }
 
 /// What is wrong with a session.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum SessionProblem {
     /// There is something in the folder, and it is not a session.

@@ -11,7 +11,7 @@ pub fn guided_record(guide: &Guide) -> GuidedRecord {
         translation_m: step.base_from_tip.translation().into(),
         rotation_xyzw: step.base_from_tip.xyzw(),
         joints: step.joints.map(|joints| joints.to_vec()),
-        why: step.why.text().say(English),
+        why: step.why.text().in_language(English),
         before_mm: step.why.errors_m().map(|(from_m, _)| mm(from_m)),
         promised_mm: step.why.errors_m().map(|(_, to_m)| mm(to_m)),
         achieved_mm: step.achieved_m.map(mm),
@@ -25,8 +25,9 @@ pub fn guided_record(guide: &Guide) -> GuidedRecord {
         }
         .to_owned(),
     });
-    let ending =
-        guide.ended().map(|ending| EndingRecord { code: ending.code().to_owned(), text: ending.text().say(English) });
+    let ending = guide
+        .ended()
+        .map(|ending| EndingRecord { code: ending.code().to_owned(), text: ending.text().in_language(English) });
     let box_mm = guide.options().tool_box.map(|tool_box| tool_box.bounds().map(|corner| (corner * 1e3).into()));
     GuidedRecord {
         goal_mm: mm(guide.options().goal_m),

@@ -57,7 +57,7 @@ const LONGEST_PX: f64 = 1.5;
 const BLUR_PX: (f64, f64) = (0.25, 4.0);
 /// Furthest from the start that is believed: a part of a step, at least that many pixels.
 const MAX_MOVE: (f64, f64) = (0.15, 1.5);
-/// The window is laid anew around a corner further than this from the middle of it \[px\].
+/// The window is laid again around a corner further than this from the middle of it \[px\].
 const OFF_MIDDLE_PX: f64 = 0.5;
 /// Least contrast \[grey levels\], and largest misfit as a part of it, as in the full fit.
 const MIN_CONTRAST: f64 = 3.0;

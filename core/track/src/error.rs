@@ -4,7 +4,7 @@ use handeye_detect::VisionError;
 use handeye_geometry::camera::CameraError;
 
 /// Why there is no tracker, or no update. A board that is not in the image is not an error.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum TrackError {
     /// The intrinsics cannot be computed with.

@@ -85,7 +85,7 @@ pub struct MotionModel {
 /// An image with its circumstances.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<'a> {
-    /// Its time \[s\]; must grow from image to image, a step back starts the tracker anew.
+    /// Its time \[s\]; must grow from image to image, a step back starts the tracker again.
     pub time_s: f64,
     /// The image.
     pub grey: &'a GrayImage,

@@ -98,7 +98,7 @@ impl Tracker {
     }
 
     /// Takes an image in. An image of the same time as the one before changes nothing and gets the same answer; an
-    /// earlier one starts the tracker anew.
+    /// earlier one starts the tracker again.
     ///
     /// A board that is not in the image is no error: [`Update::state`] says so.
     ///

@@ -1,10 +1,10 @@
-//! Sentences with values in them, which can be said in any language.
+//! Sentences with values in them, which can be reported in any language.
 //!
 //! The English sentence is the template. `text!("{n} degrees of freedom", n = 12)` makes a [`Text`] that can be kept, sent
 //! between threads and logged; whoever shows it has a [`Catalogue`]. What a library or the cell says in its own words
 //! stays as it is.
 //!
-//! Errors are such sentences by `derive(Said)`: `#[error("…")]` is the template. An error of another library is a value in
+//! Errors are such sentences by `derive(Localized)`: `#[error("…")]` is the template. An error of another library is a value in
 //! one of them.
 //!
 //! `{n|degree|degrees}` in a template is the first word where the value of `n` is 1, and the second otherwise. A language
@@ -24,7 +24,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize, Serializer};
 
-pub use handeye_said::Said;
+pub use handeye_wording_derive::Localized;
 
 /// A language, with the templates in it.
 pub trait Catalogue: Copy {
@@ -124,10 +124,10 @@ impl Value {
     }
 
     /// It by itself, in a language.
-    pub fn say(&self, language: impl Catalogue) -> String {
+    pub fn in_language(&self, language: impl Catalogue) -> String {
         match self {
             Self::Plain(plain) => plain.clone(),
-            Self::Text(text) => text.say(language),
+            Self::Text(text) => text.in_language(language),
         }
     }
 }
@@ -161,7 +161,7 @@ impl Text {
         self.verbatim.then_some(&*self.english)
     }
 
-    /// With a value more, for what is said with one of several templates.
+    /// With a value more, for what is reported with one of several templates.
     #[must_use]
     pub fn with(mut self, name: &'static str, value: impl Into<Value>) -> Self {
         self.values.push((Cow::Borrowed(name), value.into()));
@@ -181,15 +181,15 @@ impl Text {
     }
 
     /// The sentence in a language.
-    pub fn say(&self, language: impl Catalogue) -> String {
+    pub fn in_language(&self, language: impl Catalogue) -> String {
         if self.verbatim {
             return self.english.to_string();
         }
         let template = language.translation(&self.english).unwrap_or(&self.english);
-        let mut said = String::with_capacity(template.len() + 16);
+        let mut reported = String::with_capacity(template.len() + 16);
         let mut rest = template;
         while let Some((before, after)) = rest.split_once('{') {
-            said.push_str(before);
+            reported.push_str(before);
             let (name, after) = after.split_once('}').unwrap_or((after, ""));
             let (name, forms) =
                 name.split_once('|').map_or((name, None), |(name, forms)| (name, forms.split_once('|')));
@@ -197,15 +197,15 @@ impl Text {
             debug_assert!(value.is_some(), "{template:?} has no value {name}");
             match value {
                 Some((_, Value::Plain(plain))) => {
-                    said.push_str(forms.map_or(plain, |(one, many)| if plain == "1" { one } else { many }));
+                    reported.push_str(forms.map_or(plain, |(one, many)| if plain == "1" { one } else { many }));
                 }
-                Some((_, Value::Text(text))) => said.push_str(&text.say(language)),
+                Some((_, Value::Text(text))) => reported.push_str(&text.in_language(language)),
                 None => {}
             }
             rest = after;
         }
-        said.push_str(rest);
-        said
+        reported.push_str(rest);
+        reported
     }
 
     /// Whether there is nothing to say.
@@ -218,14 +218,14 @@ impl Text {
     /// # Errors
     /// Those of the serializer.
     pub fn serialize_english<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&self.say(English))
+        serializer.serialize_str(&self.in_language(English))
     }
 }
 
 /// In English, as errors are logged, kept in documents and printed by the command line.
 impl fmt::Display for Text {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.say(English))
+        f.write_str(&self.in_language(English))
     }
 }
 

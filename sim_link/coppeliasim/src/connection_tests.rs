@@ -276,10 +276,10 @@ fn a_cell_in_this_process_is_not_to_be_started_by_anybody() {
         let (mut connection, _log) = connection(move |_| server());
         connection.options.is_own_cell = true;
         let error = connection.call("sim.a", vec![]).expect_err("no answer");
-        let said = error.to_string();
-        assert!(error.is_connection_loss() && said.contains(says), "{said}");
+        let reported = error.to_string();
+        assert!(error.is_connection_loss() && reported.contains(says), "{reported}");
         for word in ["start", "simulator", "CoppeliaSim", "server"] {
-            assert!(!said.contains(word), "{word}: {said}");
+            assert!(!reported.contains(word), "{word}: {reported}");
         }
     }
     assert_eq!(ConnectionOptions::own_cell().heartbeat, None, "its silence does not mean that it has gone");

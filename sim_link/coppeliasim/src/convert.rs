@@ -21,7 +21,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 const MAX_SIDE: f64 = 16384.0;
 
 /// A value of the simulator that means nothing.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum ConvertError {
     /// A number is infinite or not a number.

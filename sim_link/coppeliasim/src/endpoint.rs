@@ -7,7 +7,7 @@ use std::str::FromStr;
 pub const DEFAULT_PORT: u16 = 23000;
 
 /// An address that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("{text:?} is not an address of a server: {reason}; write HOST:PORT, for example 127.0.0.1:23000")]
 pub struct BadEndpoint {
     /// What was given.

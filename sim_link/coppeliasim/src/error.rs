@@ -13,7 +13,7 @@ use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Why a call, or a task made of calls, has no result. Each message says what to do next.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum LinkError {
     /// The address cannot be used.
@@ -89,7 +89,7 @@ pub enum LinkError {
         call: String,
     },
     /// The server answered with an error.
-    #[error("{call} failed in the simulator: {said}", said = without_place(message))]
+    #[error("{call} failed in the simulator: {reported}", reported = without_place(message))]
     Remote {
         /// Which call.
         call: String,
@@ -419,7 +419,7 @@ mod tests {
 
     #[test]
     fn an_error_is_said_without_the_line_of_the_servers_code_and_recognized_with_and_without_it() {
-        let said = |message: &str| {
+        let reported = |message: &str| {
             let error = LinkError::Remote { call: "sim.f".to_owned(), message: message.to_owned() };
             (error.to_string(), error.is_missing_object())
         };
@@ -427,10 +427,13 @@ mod tests {
         for place in
             ["", "939: ", "/opt/sim/lua/motion.lua:17: ", "C:\\sim\\lua\\motion.lua:17: ", "[string \"x\"]:354: "]
         {
-            assert_eq!(said(&format!("{place}{missing}")), (format!("sim.f failed in the simulator: {missing}"), true));
+            assert_eq!(
+                reported(&format!("{place}{missing}")),
+                (format!("sim.f failed in the simulator: {missing}"), true)
+            );
         }
         for whole in ["joint 3: out of range", "17", "", ": x"] {
-            assert_eq!(said(whole), (format!("sim.f failed in the simulator: {whole}"), false));
+            assert_eq!(reported(whole), (format!("sim.f failed in the simulator: {whole}"), false));
         }
     }
 }

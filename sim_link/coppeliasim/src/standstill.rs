@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// How long another client may hold the simulation before it is said: longer than the slowest step of a program that is at
+/// How long another client may hold the simulation before it is reported: longer than the slowest step of a program that is at
 /// work, and no longer than a person waits for an arm before looking elsewhere.
 pub(super) const LONGEST_HOLD: Duration = Duration::from_secs(3);
 
@@ -40,7 +40,7 @@ impl Standstill {
 mod tests {
     use super::*;
 
-    /// When a server that answers at intervals of so many seconds is said to be held.
+    /// When a server that answers at intervals of so many seconds is reported to be held.
     fn held_after_s(interval_s: f64) -> Option<f64> {
         let start = Instant::now();
         let mut standstill = Standstill::begin(start);

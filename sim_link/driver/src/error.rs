@@ -7,7 +7,7 @@ use super::spec::BadSpec;
 use super::wire::WireError;
 
 /// Why a driver does not do what it is asked for. Each names the driver.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum DriverError {
     /// The text names none.
@@ -109,7 +109,7 @@ impl DriverError {
 }
 
 /// How a connection to a driver ended.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum Ending {
     /// The process ended by itself.
@@ -131,7 +131,7 @@ pub enum Ending {
     Broken(WireError),
     /// It said that it cannot go on.
     #[error("gave up: {0}")]
-    Said(String),
+    GaveUp(String),
     /// No answer to `hello`.
     #[error("has not answered `hello` within {seconds} s{last}", seconds = after.as_secs_f64(), last = last(last_line.as_ref()))]
     NoHello {

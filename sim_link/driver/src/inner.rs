@@ -43,7 +43,7 @@ pub enum Progress {
 
 /// How a driver ended once it was told to.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Burial {
+pub enum DriverExit {
     /// The process ended by itself.
     Ended {
         /// In the words of the system.
@@ -79,7 +79,7 @@ impl FrameRequest {
 
 /// What has been read to its end.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct ReadUp {
+pub struct DrainedOutput {
     /// What the driver sends.
     pub output: bool,
     /// Standard error.
@@ -106,7 +106,7 @@ pub struct Inner {
     pub preparations: u64,
     /// Why it is over.
     pub ending: Option<Ending>,
-    pub read_up: ReadUp,
+    pub read_up: DrainedOutput,
     pub clock: ClockOffset,
     /// Pings under way, with when they left.
     pub pings: VecDeque<(u64, f64)>,
@@ -125,7 +125,7 @@ pub struct Inner {
     pub requests: BTreeMap<u64, Progress>,
     pub last_id: u64,
     pub is_armed: bool,
-    /// The request whose answer arms it: what is said after that answer may take it back at once.
+    /// The request whose answer arms it: what is reported after that answer may take it back at once.
     pub arming: Option<u64>,
     /// Why it is no longer, where the driver has said so.
     pub disarmed: Option<String>,
@@ -133,7 +133,7 @@ pub struct Inner {
     pub log: LogLines,
     pub trial: Trial,
     /// How the driver ended once the connection was over.
-    pub burial: Option<Burial>,
+    pub burial: Option<DriverExit>,
     unknown: BTreeSet<String>,
 }
 
@@ -163,7 +163,7 @@ impl Inner {
             }
             FromDriver::Error(LogMessage { text, .. }) => {
                 self.log.add(LogLevel::Error, false, &text);
-                self.ending.get_or_insert(Ending::Said(text));
+                self.ending.get_or_insert(Ending::GaveUp(text));
                 Ok(())
             }
             FromDriver::Unknown(kind) => {
@@ -209,7 +209,7 @@ impl Inner {
         let wrong = |why| misplaced(format!("arm: {why}"));
         let arm = chain::arm_of(&hello).map_err(wrong)?;
         self.chain = ChainWatch::new(&hello, arm.as_ref()).map_err(wrong)?;
-        self.arm = arm.map(|arm| Arc::new(self.chain.standing(arm)));
+        self.arm = arm.map(|arm| Arc::new(self.chain.placed(arm)));
         self.hello = Some(Arc::new(hello));
         self.last_heard_s = arrived_s;
         Ok(())
@@ -280,8 +280,8 @@ impl Inner {
         match self.hello.as_ref().and_then(|hello| hello.camera) {
             Some(camera) if (camera.width, camera.height) == (width, height) => Ok(()),
             Some(camera) => {
-                let said = format!("{}×{}", camera.width, camera.height);
-                Err(misplaced(format!("it is {width}×{height} and the camera of hello {said}")))
+                let reported = format!("{}×{}", camera.width, camera.height);
+                Err(misplaced(format!("it is {width}×{height} and the camera of hello {reported}")))
             }
             None => Err(misplaced("an image without `camera` in hello")),
         }

@@ -4,7 +4,7 @@
 //!
 //! | module | what it knows |
 //! | --- | --- |
-//! | [`message`] | what is said, and what is wrong with a message |
+//! | [`message`] | what is reported, and what is wrong with a message |
 //! | [`wire`] | lines and the bytes that follow them, with limits |
 //! | [`Driver`] | one program: state, images, motions, log, how it ended |
 //! | [`DriverHost`] | the same cell for several threads, started again when it is gone |

@@ -140,7 +140,7 @@ impl Driver {
             last_s = Some(reading.stamp_s);
             watch.take(reading.place()).then_some(())
         })?;
-        let Some(newest) = watch.newest().filter(|_| watch.stands().is_some()) else { return Ok(MoveEnd::Unseen) };
+        let Some(newest) = watch.newest().filter(|_| watch.is_still().is_some()) else { return Ok(MoveEnd::Unseen) };
         if stood.is_none() {
             return Ok(watch.moved().map_or(MoveEnd::Unseen, MoveEnd::NotThere));
         }

@@ -55,7 +55,7 @@ pub enum ChainPlacement {
 
 /// A place at which the arm stood.
 #[derive(Debug, Clone)]
-struct Stand {
+struct RestPose {
     joints: JointValues,
     base_from_tip: Pose<Base, Tip>,
     /// How the chain turns its end there.
@@ -70,7 +70,7 @@ pub struct ChainWatch {
     is_ur5: bool,
     /// Where the driver says that the chain stands.
     base_from_arm: Isometry3<f64>,
-    stands: Vec<Stand>,
+    rests: Vec<RestPose>,
     rest: RestWatch,
     placement: ChainPlacement,
 }
@@ -93,8 +93,8 @@ impl ChainWatch {
             })
             .collect();
         let chain = arm.clone().with_ranges(&ranges).map_err(|error| error.to_string())?;
-        let stands = hello.base_from_arm.map(|pose| pose.pose::<Base, Base>("base_from_arm")).transpose();
-        let base_from_arm = stands.map_err(|error| error.to_string())?;
+        let place = hello.base_from_arm.map(|pose| pose.pose::<Base, Base>("base_from_arm")).transpose();
+        let base_from_arm = place.map_err(|error| error.to_string())?;
         let ur5 = ArmKind::Ur5Coppeliasim.name();
         Ok(Self {
             chain: Some(chain),
@@ -106,7 +106,7 @@ impl ChainWatch {
     }
 
     /// The same arm where the driver says that it stands.
-    pub fn standing(&self, arm: Arm) -> Arm {
+    pub fn placed(&self, arm: Arm) -> Arm {
         let (base_from_first, flange_from_tip) = (self.base_from_arm * arm.base_from_first, arm.flange_from_tip);
         arm.mounted(base_from_first, flange_from_tip)
     }
@@ -145,7 +145,7 @@ impl ChainWatch {
                     let tool = flange.isometry().inv_mul(reading.base_from_tip.isometry());
                     self.placement = if is_near(miss) { known(base_from_arm, tool) } else { foreign(miss) };
                 } else {
-                    self.stand(&Stand {
+                    self.add_rest(&RestPose {
                         joints: *joints,
                         base_from_tip: reading.base_from_tip,
                         turned: arm_from_end.isometry().rotation,
@@ -164,19 +164,19 @@ impl ChainWatch {
     }
 
     /// A place more, where it is another one; and what all of them say.
-    fn stand(&mut self, stand: &Stand) {
-        let is_other = |known: &Stand| known.turned.angle_to(&stand.turned) >= APART_RAD;
-        if self.stands.len() >= MOST || !self.stands.iter().all(is_other) {
+    fn add_rest(&mut self, rest: &RestPose) {
+        let is_other = |known: &RestPose| known.turned.angle_to(&rest.turned) >= APART_RAD;
+        if self.rests.len() >= MOST || !self.rests.iter().all(is_other) {
             return;
         }
-        self.stands.push(stand.clone());
-        self.placement = ChainPlacement::Open { places: self.stands.len() };
-        if self.stands.len() < NEED || !self.turned_about_two_axes() {
+        self.rests.push(rest.clone());
+        self.placement = ChainPlacement::Open { places: self.rests.len() };
+        if self.rests.len() < NEED || !self.turned_about_two_axes() {
             return;
         }
         let Some(chain) = &self.chain else { return };
-        let view = |stand: &'_ Stand| (stand.base_from_tip, stand.joints);
-        let views: Vec<_> = self.stands.iter().map(view).collect();
+        let view = |rest: &'_ RestPose| (rest.base_from_tip, rest.joints);
+        let views: Vec<_> = self.rests.iter().map(view).collect();
         let views: Vec<JointView<'_>> = views
             .iter()
             .map(|(base_from_tip, joints)| JointView { base_from_tip: *base_from_tip, joints_rad: joints })
@@ -192,7 +192,7 @@ impl ChainWatch {
     }
 
     fn turned_about_two_axes(&self) -> bool {
-        let Some((first, others)) = self.stands.split_first() else { return false };
+        let Some((first, others)) = self.rests.split_first() else { return false };
         let axes: Vec<Vector3<f64>> =
             others.iter().filter_map(|other| Some((other.turned / first.turned).axis()?.into_inner())).collect();
         axes.iter().enumerate().any(|(i, a)| axes[..i].iter().any(|b| a.cross(b).norm() >= TWO_AXES))

@@ -3,7 +3,7 @@ use handeye_arm::JointKind;
 use super::*;
 use crate::message::{Ability, JointMessage, PoseMessage};
 
-const STANDS: [[f64; 6]; 5] = [
+const RESTS: [[f64; 6]; 5] = [
     [0.1, -1.2, 1.4, -0.3, 1.5, 0.0],
     [0.5, -1.0, 1.2, -0.6, 1.2, 0.4],
     [-0.4, -1.4, 1.6, 0.2, 1.9, -0.5],
@@ -54,7 +54,7 @@ fn state(of: ArmKind, joints: [f64; 6], stamp: f64) -> StateMessage {
 }
 
 /// Feeds states for a second of rest each.
-fn stand(watch: &mut ChainWatch, state: &StateMessage, from_s: f64) {
+fn add_rest(watch: &mut ChainWatch, state: &StateMessage, from_s: f64) {
     let arm = ArmKind::Ur5e.arm();
     for i in 0..10 {
         let state = StateMessage { stamp: from_s + 0.1 * f64::from(i), ..state.clone() };
@@ -75,7 +75,7 @@ fn known(watch: &ChainWatch) -> &ArmKinematics {
 
 fn assert_placed(watch: &ChainWatch) {
     let kinematics = known(watch);
-    for joints in STANDS {
+    for joints in RESTS {
         let truth = base_from_arm() * ArmKind::Ur5e.arm().forward(&joints).unwrap().isometry() * tool();
         let (off_m, off_rad) = kinematics.tip(&joints).distance_to(&Pose::from_isometry(truth));
         assert!(off_m < 1e-9 && off_rad < 1e-7, "{off_m} m, {off_rad} rad");
@@ -88,11 +88,11 @@ fn assert_placed(watch: &ChainWatch) {
 fn the_flange_beside_the_tip_places_the_chain_at_once() {
     let hello = Hello { base_from_arm: Some(message(base_from_arm())), ..hello(ArmKind::Ur5e) };
     let mut watch = watch(&hello);
-    let first = state(ArmKind::Ur5e, STANDS[0], 0.0);
+    let first = state(ArmKind::Ur5e, RESTS[0], 0.0);
     let arm = ArmKind::Ur5e.arm();
     watch.take(&first, &Reading::of(&first, 6, Some(&arm)).unwrap());
     assert_eq!(watch.placement(), &ChainPlacement::Open { places: 0 }, "nobody knows yet whether it stands");
-    stand(&mut watch, &first, 0.1);
+    add_rest(&mut watch, &first, 0.1);
     assert_placed(&watch);
 }
 
@@ -100,24 +100,24 @@ fn the_flange_beside_the_tip_places_the_chain_at_once() {
 fn a_flange_that_is_elsewhere_than_the_chain_has_it_is_said_with_the_number() {
     // The driver does not say where the arm stands.
     let mut watch = watch(&hello(ArmKind::Ur5e));
-    stand(&mut watch, &state(ArmKind::Ur5e, STANDS[0], 0.0), 0.0);
+    add_rest(&mut watch, &state(ArmKind::Ur5e, RESTS[0], 0.0), 0.0);
     let &ChainPlacement::Foreign { distance_m, angle_rad } = watch.placement() else {
         panic!("{:?}", watch.placement())
     };
-    let computed = ArmKind::Ur5e.arm().forward(&STANDS[0]).unwrap();
+    let computed = ArmKind::Ur5e.arm().forward(&RESTS[0]).unwrap();
     let expected = computed.distance_to(&Pose::from_isometry(base_from_arm() * computed.isometry()));
     assert!((distance_m - expected.0).abs() < 1e-9 && (angle_rad - expected.1).abs() < 1e-9);
     // It stays so: nobody drives by a chain that once was another one.
-    stand(&mut watch, &state(ArmKind::Ur5e, STANDS[1], 0.0), 5.0);
+    add_rest(&mut watch, &state(ArmKind::Ur5e, RESTS[1], 0.0), 5.0);
     assert!(matches!(watch.placement(), ChainPlacement::Foreign { .. }));
 }
 
 #[test]
 fn without_a_flange_places_turned_about_two_axes_show_where_the_chain_stands() {
     let mut watch = watch(&hello(ArmKind::Ur5e));
-    for (i, joints) in STANDS.into_iter().enumerate() {
+    for (i, joints) in RESTS.into_iter().enumerate() {
         let state = StateMessage { base_from_flange: None, ..state(ArmKind::Ur5e, joints, 0.0) };
-        stand(&mut watch, &state, 10.0 * i as f64);
+        add_rest(&mut watch, &state, 10.0 * i as f64);
         if i + 1 < NEED {
             assert_eq!(watch.placement(), &ChainPlacement::Open { places: i + 1 });
         }
@@ -125,26 +125,26 @@ fn without_a_flange_places_turned_about_two_axes_show_where_the_chain_stands() {
     assert_placed(&watch);
     // Another tool is set on the controller.
     let other = Isometry3::translation(0.0, 0.0, 0.05);
-    let flange = base_from_arm() * ArmKind::Ur5e.arm().forward(&STANDS[2]).unwrap().isometry();
+    let flange = base_from_arm() * ArmKind::Ur5e.arm().forward(&RESTS[2]).unwrap().isometry();
     let state = StateMessage {
         base_from_flange: None,
         base_from_tip: Some(message(flange * tool() * other)),
-        ..state(ArmKind::Ur5e, STANDS[2], 0.0)
+        ..state(ArmKind::Ur5e, RESTS[2], 0.0)
     };
-    stand(&mut watch, &state, 90.0);
+    add_rest(&mut watch, &state, 90.0);
     let &ChainPlacement::Foreign { distance_m, .. } = watch.placement() else { panic!("{:?}", watch.placement()) };
     assert!((distance_m - 0.05).abs() < 1e-9, "{distance_m}");
 }
 
-/// All places turned about the axis of the first joint: where along and about it the chain stands is not said.
+/// All places turned about the axis of the first joint: where along and about it the chain stands is not reported.
 #[test]
 fn turns_about_one_axis_show_nothing() {
     let mut watch = watch(&hello(ArmKind::Ur5e));
     for i in 0..6 {
-        let mut joints = STANDS[0];
+        let mut joints = RESTS[0];
         joints[0] = -1.0 + 0.4 * f64::from(i);
         let state = StateMessage { base_from_flange: None, ..state(ArmKind::Ur5e, joints, 0.0) };
-        stand(&mut watch, &state, 10.0 * f64::from(i));
+        add_rest(&mut watch, &state, 10.0 * f64::from(i));
     }
     assert_eq!(watch.placement(), &ChainPlacement::Open { places: 6 });
 }
@@ -152,9 +152,9 @@ fn turns_about_one_axis_show_nothing() {
 #[test]
 fn the_chain_of_another_arm_is_never_known() {
     let mut watch = watch(&hello(ArmKind::Ur5e));
-    for (i, joints) in STANDS.into_iter().enumerate() {
+    for (i, joints) in RESTS.into_iter().enumerate() {
         let state = StateMessage { base_from_flange: None, ..state(ArmKind::Ur10e, joints, 0.0) };
-        stand(&mut watch, &state, 10.0 * i as f64);
+        add_rest(&mut watch, &state, 10.0 * i as f64);
         assert!(!matches!(watch.placement(), ChainPlacement::Known(_)), "{i}");
     }
     assert!(matches!(watch.placement(), ChainPlacement::Foreign { .. }), "{:?}", watch.placement());
@@ -165,12 +165,12 @@ fn the_chain_of_another_arm_is_never_known() {
 fn joints_alone_give_the_tip_of_the_chain() {
     let hello = Hello { base_from_arm: Some(message(base_from_arm())), ..hello(ArmKind::Ur5e) };
     let mut watch = watch(&hello);
-    let arm = watch.standing(ArmKind::Ur5e.arm());
+    let arm = watch.placed(ArmKind::Ur5e.arm());
     let state = StateMessage {
         base_from_flange: None,
         base_from_tip: None,
         flange_from_tcp: Some(message(tool())),
-        ..state(ArmKind::Ur5e, STANDS[0], 0.0)
+        ..state(ArmKind::Ur5e, RESTS[0], 0.0)
     };
     for i in 0..4 {
         let state = StateMessage { stamp: 0.1 * f64::from(i), ..state.clone() };
@@ -184,7 +184,7 @@ fn an_arm_that_moves_shows_nothing() {
     let mut watch = watch(&Hello { base_from_arm: Some(message(base_from_arm())), ..hello(ArmKind::Ur5e) });
     let arm = ArmKind::Ur5e.arm();
     for i in 0..50 {
-        let mut joints = STANDS[0];
+        let mut joints = RESTS[0];
         joints[0] += 0.01 * f64::from(i);
         let state = state(ArmKind::Ur5e, joints, 0.1 * f64::from(i));
         watch.take(&state, &Reading::of(&state, 6, Some(&arm)).unwrap());

@@ -68,7 +68,7 @@ impl RestWatch {
     }
 
     /// Whether the newest state is where the one before it was; `None` before the second.
-    pub fn stands(&self) -> Option<bool> {
+    pub fn is_still(&self) -> Option<bool> {
         let (first, since, newest) = (self.first?, self.since?, self.newest?);
         (newest.stamp_s > first.stamp_s).then_some(newest.stamp_s > since.stamp_s)
     }
@@ -115,9 +115,9 @@ mod tests {
     #[test]
     fn an_arm_that_stands_has_not_moved_for_a_while_and_one_that_creeps_does_not_stand() {
         let mut watch = RestWatch::default();
-        assert!(!watch.take(place(0.0, 0.5)) && watch.stands().is_none(), "one state says nothing");
-        assert!(!watch.take(place(0.1, 0.6)) && watch.stands() == Some(false));
-        assert!(!watch.take(place(0.2, 0.6)) && watch.stands() == Some(true));
+        assert!(!watch.take(place(0.0, 0.5)) && watch.is_still().is_none(), "one state says nothing");
+        assert!(!watch.take(place(0.1, 0.6)) && watch.is_still() == Some(false));
+        assert!(!watch.take(place(0.2, 0.6)) && watch.is_still() == Some(true));
         assert!(watch.take(place(0.31, 0.6)));
         assert_eq!(watch.moved(), Some(Moved::Joint { index: 1, from: 0.5, to: 0.6 }));
         // A thousandth a state is a twentieth of a radian a second.

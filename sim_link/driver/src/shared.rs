@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use handeye_geometry::progress::CancelToken;
 
 use super::error::{DriverError, Ending};
-pub use super::inner::{Burial, FrameRequest, Inner, Progress};
+pub use super::inner::{DriverExit, FrameRequest, Inner, Progress};
 use super::message::{FromDriver, ToDriver};
 use super::options::DriverOptions;
 use super::wire::{Excerpt, Incoming, WireError};

@@ -13,7 +13,7 @@ pub enum DriverSpec {
 }
 
 /// A text that names no driver.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum BadSpec {
     /// Nothing but spaces.

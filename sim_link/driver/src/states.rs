@@ -52,7 +52,7 @@ pub struct RobotAt {
 }
 
 /// Why an image has no pose.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum NoPose {
     /// There is no robot.

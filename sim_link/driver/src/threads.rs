@@ -11,7 +11,7 @@ use super::error::{DriverError, Ending};
 use super::link::LinkEnd;
 use super::log::LONGEST;
 use super::message::{LogLevel, ToDriver};
-use super::shared::{Burial, Inner, Out, Shared};
+use super::shared::{DriverExit, Inner, Out, Shared};
 use super::wire::MessageReader;
 
 /// How long the rest of what a driver that has ended said may take to be read.
@@ -147,11 +147,11 @@ fn bury(shared: &Shared, end: &mut LinkEnd) {
             if shared.lock().trial.leaves_without_bye {
                 let _closed_already = stream.shutdown(Shutdown::Write).is_err();
             }
-            if shared.wait_for_output(patience) { Burial::Closed } else { Burial::LeftOpen }
+            if shared.wait_for_output(patience) { DriverExit::Closed } else { DriverExit::LeftOpen }
         }
         LinkEnd::Process(..) => match end.ended_within(patience) {
-            Some(status) => Burial::Ended { status: status.to_string(), is_success: status.success() },
-            None => Burial::Killed,
+            Some(status) => DriverExit::Ended { status: status.to_string(), is_success: status.success() },
+            None => DriverExit::Killed,
         },
     };
     end.kill(living);

@@ -28,7 +28,7 @@ pub struct Incoming {
 }
 
 /// A message that breaks the protocol, with the line.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("message {number}: {problem}: {excerpt}")]
 pub struct WireError {
     /// Which line of the conversation it was, counted from 1.
@@ -40,7 +40,7 @@ pub struct WireError {
 }
 
 /// What is wrong with a message.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum WireProblem {
     /// No end of line within [`MAX_LINE`].

@@ -9,8 +9,8 @@ pub fn moved_text(moved: &Moved, kind: impl Fn(usize) -> Option<JointKind>) -> T
     match *moved {
         Moved::Joint { index, from, to } => {
             let kind = kind(index).unwrap_or(JointKind::Revolute);
-            let said = |value| format!("{:.1}", kind.quantity(value)).replace('-', "−");
-            text!("joint {joint} from {from} to {to}", joint = index + 1, from = said(from), to = said(to))
+            let reported = |value| format!("{:.1}", kind.quantity(value)).replace('-', "−");
+            text!("joint {joint} from {from} to {to}", joint = index + 1, from = reported(from), to = reported(to))
         }
         Moved::Tip { distance_m, angle_rad } => text!(
             "the tip by {mm} mm and {deg}°",

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, BoardMotion, FollowEnd, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, BoardMotion, FollowEnd, FollowMoment, FollowRequest};
 use handeye_dataset::taught_poses::MotionLimits;
 use handeye_driver::LogLevel;
 use handeye_geometry::depth::DepthImage;
@@ -312,7 +312,7 @@ pub trait MotionPort: Send {
     /// As [`Self::move_to`].
     fn follow(
         &mut self,
-        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+        requested: &mut dyn FnMut(&FollowMoment) -> FollowRequest,
     ) -> Result<Result<FollowEnd, MotionOutcome>, PortError>;
 }
 

@@ -49,7 +49,7 @@ impl fmt::Display for BoardPath {
 }
 
 /// A name that no path has.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("there is no path {0:?} for the board; it is one of still, circle, figure_eight, random_walk, step")]
 pub struct UnknownPath(pub String);
 

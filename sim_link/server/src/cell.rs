@@ -19,7 +19,7 @@ pub const MAX_SIGNAL_BYTES: usize = 64 << 10;
 const MAX_LOG: usize = 200;
 
 /// Why a cell cannot be built.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum BuildError {
     /// The scene is not usable.

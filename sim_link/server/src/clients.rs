@@ -25,7 +25,7 @@ pub type Peer = Vec<u8>;
 
 /// Why a client is not served.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Crowded {
+pub enum ClientRefused {
     /// All places are taken by clients that hold something.
     #[error("the built-in cell serves {MAX_CLIENTS} clients at a time: close one and try again.")]
     Cell,
@@ -138,16 +138,16 @@ impl Clients {
     /// Notes that a client was heard of over a connection, and makes a record of it if it is new.
     ///
     /// # Errors
-    /// [`Crowded`], when there are too many that must not be forgotten.
-    pub fn meet(&mut self, peer: &Peer, uuid: &str, idle_limit: Duration, now: Duration) -> Result<(), Crowded> {
+    /// [`ClientRefused`], when there are too many that must not be forgotten.
+    pub fn meet(&mut self, peer: &Peer, uuid: &str, idle_limit: Duration, now: Duration) -> Result<(), ClientRefused> {
         if self.records.get(uuid).is_none_or(|client| client.peer != *peer) {
             let beside = self.records.values().filter(|client| client.peer == *peer).count();
             if beside >= MAX_CLIENTS_PER_CONNECTION && !self.forget_idlest(|client| client.peer == *peer) {
-                return Err(Crowded::Connection);
+                return Err(ClientRefused::Connection);
             }
         }
         if !self.records.contains_key(uuid) && self.records.len() >= MAX_CLIENTS && !self.forget_idlest(|_| true) {
-            return Err(Crowded::Cell);
+            return Err(ClientRefused::Cell);
         }
         let client = self.records.entry(uuid.to_owned()).or_insert_with(|| Client::new(peer, idle_limit, now));
         if client.peer != *peer {

@@ -71,7 +71,7 @@ impl CellConfig {
 }
 
 /// Why a cell cannot be served.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum CellError {
     /// The scene is not usable.

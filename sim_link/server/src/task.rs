@@ -117,7 +117,7 @@ impl WaitTask {
 impl Task for WaitTask {
     fn resume(&mut self, cell: &mut Cell, _wake: Wake) -> Result<Next, ApiError> {
         let now_s = if self.simulated { cell.world.simulation().time_s() } else { cell.now.as_secs_f64() };
-        // A simulation that was started anew has its clock back at zero.
+        // A simulation that was started again has its clock back at zero.
         self.since_s = self.since_s.min(now_s);
         let over_s = now_s - self.since_s - self.seconds;
         if over_s >= 0.0 {

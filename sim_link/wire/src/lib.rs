@@ -30,7 +30,7 @@ pub const MAX_MESSAGE_BYTES: usize = 64 << 20;
 pub const MAX_REPLY_BYTES: usize = 2 * MAX_MESSAGE_BYTES;
 
 /// Bytes that are not one CBOR item, or an item of the wrong shape.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum WireError {
     /// Longer than [`MAX_MESSAGE_BYTES`].

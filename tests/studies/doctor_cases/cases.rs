@@ -20,7 +20,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// What was said, or what is wrong with it.
+    /// What was reported, or what is wrong with it.
     pub fn verdict(&self, examined: impl Fn(&Observations) -> Diagnosis) -> Result<String, String> {
         let diagnosis = examined(&self.observations);
         let grave: Vec<Code> =

@@ -3,7 +3,7 @@
 //! `cargo run --release -p handeye_studies --example doctor_cases -- [HEALTHY SESSIONS] [SEEDS PER FAULT] [FAULT]`, or
 //! `… -- TEXT` for the whole report on every case whose name has that text; `… -- as-met [SESSIONS] [FIRST]` for the healthy
 //! sessions with an arm whose error depends on where it stands; one alone with its report; `… -- servo [SESSIONS] [FIRST]` for those
-//! of an arm of servo motors, and for a board that slipped in them; `… -- lenses [GROUPS] [FIRST]` for lenses that are said to differ
+//! of an arm of servo motors, and for a board that slipped in them; `… -- lenses [GROUPS] [FIRST]` for lenses that are reported to differ
 //! among eleven sessions of one camera on such arms; `… -- limits [SESSIONS]` for the sizes from which on faults are found.
 
 mod cases;
@@ -69,7 +69,7 @@ fn servo(first: u64, sessions: u64) {
     }
 }
 
-/// Groups of eleven sessions of one camera on an arm of servo motors: lenses that are said to differ.
+/// Groups of eleven sessions of one camera on an arm of servo motors: lenses that are reported to differ.
 fn lenses(first: u64, groups: u64) {
     for group in first..first + groups {
         let sessions: Vec<_> =
@@ -92,13 +92,13 @@ fn lenses(first: u64, groups: u64) {
     }
 }
 
-/// Whether a fault is the first explanation and accepted, or what is said instead.
-fn said_first(fault: usize, times: f64, seed: u64) -> Result<(), String> {
+/// Whether a fault is the first explanation and accepted, or what is reported instead.
+fn first_message(fault: usize, times: f64, seed: u64) -> Result<(), String> {
     let (observations, code) = faults::faulty(fault, times, seed);
     let diagnosis = faults::examined(&observations);
     match diagnosis.hypotheses.first() {
         Some(best) if best.code == code && best.accepted => Ok(()),
-        best => Err(format!("{:?}", best.map(|h| (h.code, h.accepted, h.text.say(English))))),
+        best => Err(format!("{:?}", best.map(|h| (h.code, h.accepted, h.text.in_language(English))))),
     }
 }
 
@@ -116,7 +116,7 @@ fn limits(sessions: u64) {
         for (kind, set_up) in SET_UPS.iter().enumerate() {
             let found = |times: f64, first: u64| {
                 let seeds = (0..sessions).map(|k| first + SET_UPS.len() as u64 * k + kind as u64);
-                seeds.filter(|seed| said_first(fault, times, *seed).is_ok()).count()
+                seeds.filter(|seed| first_message(fault, times, *seed).is_ok()).count()
             };
             let share = |times: f64| found(times, 6000) as f64 / sessions as f64;
             let (mut times, mut larger) = (4.0, share(4.0));
@@ -190,11 +190,11 @@ fn main() {
         if !diagnosis.is_healthy() {
             alarms += 1;
             let grave = diagnosis.findings.iter().filter(|f| f.severity >= Severity::Warning);
-            let said: Vec<String> = grave.map(|f| format!("{:?}: {}", f.code, f)).collect();
+            let reported: Vec<String> = grave.map(|f| format!("{:?}: {}", f.code, f)).collect();
             println!(
                 "healthy {seed}, {} views: {} {:?}",
                 observations.views.len(),
-                said.join(" | "),
+                reported.join(" | "),
                 diagnosis.untested
             );
         }
@@ -216,7 +216,7 @@ fn main() {
         }
         let mut first = 0;
         for seed in 0..seeds {
-            match said_first(fault, 1.0, 5000 + seed) {
+            match first_message(fault, 1.0, 5000 + seed) {
                 Ok(()) => first += 1,
                 Err(otherwise) => println!("  {name}, seed {seed}: {otherwise}"),
             }

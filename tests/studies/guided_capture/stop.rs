@@ -3,7 +3,7 @@
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::Noise;
 use handeye_plan::guided::{Ending, GuidedOptions, Step};
-use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, GuidedRun, Untold};
+use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, GuidedRun, HiddenErrors};
 use handeye_simulate::session::REALISTIC;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
@@ -13,9 +13,9 @@ pub fn stop(sessions: u64, only: &str) {
         "{:44}{:>8}{:>10}{:>10}{:>8}{:>8}{:>8}{:>9}",
         "", "reached", "< stated", "< goal", "views", "90 %", "failed", "promise"
     );
-    let as_said = Untold::NOTHING;
+    let as_said = HiddenErrors::NOTHING;
     let field = Noise { field_m: 1.5e-3, ..REALISTIC };
-    let rows: [(&str, f64, Noise, bool, Untold); 9] = [
+    let rows: [(&str, f64, Noise, bool, HiddenErrors); 9] = [
         ("goal 0.1 mm, 0.1 px, 0.1 mm, 0.02°", 1e-4, REALISTIC, false, as_said),
         ("goal 0.2 mm", 2e-4, REALISTIC, false, as_said),
         ("goal 0.4 mm", 4e-4, REALISTIC, false, as_said),
@@ -27,8 +27,8 @@ pub fn stop(sessions: u64, only: &str) {
             as_said,
         ),
         ("goal 0.5 mm, lens estimated", 5e-4, REALISTIC, true, as_said),
-        ("goal 0.4 mm, board bent by 1 mm", 4e-4, REALISTIC, false, Untold { bend_m: [1e-3, 0.6e-3], ..as_said }),
-        ("goal 0.5 mm, lens said to be 1 % longer", 5e-4, REALISTIC, false, Untold { focal: 0.99, ..as_said }),
+        ("goal 0.4 mm, board bent by 1 mm", 4e-4, REALISTIC, false, HiddenErrors { bend_m: [1e-3, 0.6e-3], ..as_said }),
+        ("goal 0.5 mm, lens said to be 1 % longer", 5e-4, REALISTIC, false, HiddenErrors { focal: 0.99, ..as_said }),
         ("goal 1 mm, robot off by 1.5 mm by place", 1e-3, field, false, as_said),
         ("goal 2 mm, robot off by 1.5 mm by place", 2e-3, field, false, as_said),
     ];

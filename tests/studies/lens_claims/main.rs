@@ -186,7 +186,7 @@ fn halves_row(scene: &Scene, what: &str, sessions: u64) {
             let off = [lens.fx - truth.fx, lens.fy - truth.fy, lens.cx - truth.cx, lens.cy - truth.cy];
             with.add(&joint.covariance, off, joint, error_m, lens.fx);
             let places = LENS_AT..LENS_AT + lens.parameter_count();
-            let before = widening::of_lens(&joint.covariance, places, joint.widening.lens.recip());
+            let before = overdispersion::of_lens(&joint.covariance, places, joint.widening.lens.recip());
             without.add(&before, off, joint, error_m, lens.fx);
             widened += usize::from(joint.widening.lens > 1.0);
             true_m.push(error_m);

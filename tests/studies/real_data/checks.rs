@@ -22,7 +22,7 @@ pub fn run(set: &Set) {
         };
         let (problem, solution) = (kept.problem(set), &kept.solution);
         let before = std::time::Instant::now();
-        let widening = match widening::check(&problem, solution, &CancelToken::default()) {
+        let widening = match overdispersion::check(&problem, solution, &CancelToken::default()) {
             Ok(widening) => widening,
             Err(error) => {
                 println!("{}: {error}", set.name);

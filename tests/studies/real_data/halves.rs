@@ -22,7 +22,7 @@ struct Half {
 impl Half {
     fn new(set: &Set, views: &[usize], free: Free) -> Option<Self> {
         let kept = Choice::new(set, views).joint(set, free)?;
-        let widening = widening::check(&kept.problem(set), &kept.solution, &CancelToken::default()).ok()?;
+        let widening = overdispersion::check(&kept.problem(set), &kept.solution, &CancelToken::default()).ok()?;
         Some(Self { solution: kept.solution, factor: widening.factor })
     }
 

@@ -3,7 +3,7 @@
 use handeye_estimate::handeye::closed_form::{self, ClosedFormSolution};
 use handeye_estimate::handeye::joint::outliers::estimate_screened;
 use handeye_estimate::handeye::joint::{
-    Free, JointProblem, JointSolution, JointStart, Noise, RobotField, estimate, with_shown_field,
+    Free, JointProblem, JointSolution, JointStart, Noise, PoseDependentError, estimate, with_shown_field,
 };
 use handeye_estimate::handeye::{PosePair, pose_graph};
 use handeye_geometry::camera::Intrinsics;
@@ -21,7 +21,7 @@ pub struct Answer {
     pub intrinsics: Intrinsics,
     pub shape: BoardShape,
     /// To be taken out of reported poses, where the method finds it and the row says that it is applied.
-    pub field: Option<RobotField>,
+    pub field: Option<PoseDependentError>,
 }
 
 impl Answer {

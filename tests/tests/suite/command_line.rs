@@ -158,8 +158,8 @@ fn the_doctor_answers_for_a_healthy_session_and_for_one_without_an_answer() {
     let findings = diagnosis["findings"].as_array().expect("findings");
     assert_eq!(findings.iter().filter(spoils).count(), 0, "{diagnosis:#}");
     for finding in findings {
-        let said = finding["text"].as_str().expect("a text");
-        assert!(text(&report.stdout).contains(said), "{said:?} is not in the report");
+        let reported = finding["text"].as_str().expect("a text");
+        assert!(text(&report.stdout).contains(reported), "{reported:?} is not in the report");
     }
 
     // That there is no calibration is what the diagnosis is about.
@@ -262,8 +262,8 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
         assert!(error_mm < before_mm, "{error_mm} mm is no gain over {before_mm}");
         before_mm = error_mm;
         let camera_from_target = (isometry(&pose["base_from_tip"]) * tip_from_camera).inverse() * base_from_target;
-        let said = isometry(&pose["camera_from_target"]);
-        assert!((camera_from_target.translation.vector - said.translation.vector).norm() < 1e-4, "{pose}");
+        let reported = isometry(&pose["camera_from_target"]);
+        assert!((camera_from_target.translation.vector - reported.translation.vector).norm() < 1e-4, "{pose}");
         // The outermost of the 10×7 corners; the lens of this cell bends nothing.
         for corner in [[0.0, 0.0], [0.135, 0.0], [0.0, 0.09], [0.135, 0.09]] {
             let at = camera_from_target * Point3::new(corner[0], corner[1], 0.0);
@@ -298,10 +298,10 @@ fn names_and_messages_of_strangers_command_no_terminal() {
     ];
     for command in commands {
         let output = handeye(command);
-        for said in [text(&output.stdout), text(&output.stderr)] {
+        for reported in [text(&output.stdout), text(&output.stderr)] {
             let obeyed: Vec<char> =
-                said.chars().filter(|letter| letter.is_control() && !"\n\t".contains(*letter)).collect();
-            assert!(obeyed.is_empty() && !said.contains('\u{202e}'), "{command:?}: {said:?}");
+                reported.chars().filter(|letter| letter.is_control() && !"\n\t".contains(*letter)).collect();
+            assert!(obeyed.is_empty() && !reported.contains('\u{202e}'), "{command:?}: {reported:?}");
         }
         assert!(text(&output.stderr).contains("\\u{202e}"), "{command:?}: {:?}", text(&output.stderr));
     }

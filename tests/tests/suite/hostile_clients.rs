@@ -200,9 +200,9 @@ fn a_cell_that_others_can_reach_says_so_in_one_line() {
     };
     assert_eq!(said_by("127.0.0.1"), "");
     assert_eq!(said_by("localhost"), "");
-    let said = said_by("0.0.0.0");
-    assert_eq!(said.lines().count(), 1, "{said}");
+    let reported = said_by("0.0.0.0");
+    assert_eq!(reported.lines().count(), 1, "{reported}");
     for word in ["warning", "network", "move the arm", "no password", "127.0.0.1"] {
-        assert!(said.contains(word), "{word}: {said}");
+        assert!(reported.contains(word), "{word}: {reported}");
     }
 }

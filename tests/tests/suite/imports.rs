@@ -162,12 +162,12 @@ fn the_list_of_hypotheses_counts_what_it_leaves_out_and_says_nothing_of_more_whe
             .arg(&found)
             .arg(&folder)
             .output();
-        let said = text(&run.expect("it runs").stdout);
+        let reported = text(&run.expect("it runs").stdout);
         let found: Value = serde_json::from_slice(&std::fs::read(&found).expect("written")).expect("JSON");
         let all = found["judgement"]["hypotheses"].as_array().expect("a list").len();
-        let more = said.lines().find_map(|line| line.trim().strip_prefix("and ")?.strip_suffix(" more"));
+        let more = reported.lines().find_map(|line| line.trim().strip_prefix("and ")?.strip_suffix(" more"));
         let left_out = more.map(|count| count.parse::<usize>().expect("a number"));
-        assert_eq!(left_out, (all > SHOWN).then(|| all - SHOWN), "{all} hypotheses:\n{said}");
+        assert_eq!(left_out, (all > SHOWN).then(|| all - SHOWN), "{all} hypotheses:\n{reported}");
         all
     });
     assert!(counts[0] > SHOWN && counts[1] < SHOWN, "both cases are there: {counts:?}");
@@ -190,8 +190,8 @@ fn recordings_of_others_are_read_as_an_independent_reader_reads_them() {
             .arg(&folder)
             .output()
             .expect("it runs");
-        let (said, errors) = (text(&run.stdout), text(&run.stderr));
-        let what = format!("{} {:?}\n{said}\n{errors}", sample.kind, sample.files);
+        let (reported, errors) = (text(&run.stdout), text(&run.stderr));
+        let what = format!("{} {:?}\n{reported}\n{errors}", sample.kind, sample.files);
         assert!(run.status.success(), "{what}");
         let found: Value = serde_json::from_slice(&std::fs::read(&found).expect("written")).expect("JSON");
         let first = &found["judgement"]["hypotheses"][0]["conventions"];
@@ -234,8 +234,8 @@ fn what_the_files_leave_open_is_listed_and_nothing_is_written() {
     let out = home.path().join("set");
     let run = command().arg("import").arg(&folder).arg("--out").arg(&out).output().expect("it runs");
     assert_eq!(run.status.code(), Some(1), "{}", text(&run.stderr));
-    let said = text(&run.stdout);
-    assert!(said.contains("mode=eye_in_hand") && said.contains("mode=eye_to_hand"), "{said}");
+    let reported = text(&run.stdout);
+    assert!(reported.contains("mode=eye_in_hand") && reported.contains("mode=eye_to_hand"), "{reported}");
     assert!(text(&run.stderr).contains("--take"), "{}", text(&run.stderr));
     for mode in ["eye_in_hand", "eye_to_hand"] {
         let command = format!("--set mode={mode} --out {}", out.display());
@@ -260,9 +260,9 @@ fn squares_counted_for_corners_and_a_target_not_named_are_said_with_what_is_seen
     for (arguments, code) in [(&[][..], 1), (&["--target", "10x7x23.6"][..], 1)] {
         let run =
             command().arg("import").arg(&folder).arg("--out").arg(&out).args(arguments).output().expect("it runs");
-        let said = text(&run.stderr);
-        assert_eq!(run.status.code(), Some(code), "{said}");
-        assert!(said.contains("9 × 6 inner corners"), "{said}");
+        let reported = text(&run.stderr);
+        assert_eq!(run.status.code(), Some(code), "{reported}");
+        assert!(reported.contains("9 × 6 inner corners"), "{reported}");
         assert!(!out.exists());
     }
 }
@@ -330,7 +330,7 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     bench.click(session::Command::Open(folder.clone()));
     bench.until("the question for the target", |model| import(model).is_some_and(|import| import.trouble.is_some()));
     assert_eq!(bench.model().dialog, Some(Dialog::Import));
-    let why = import(bench.model()).and_then(|import| import.trouble).expect("a reason").say(Language::English);
+    let why = import(bench.model()).and_then(|import| import.trouble).expect("a reason").in_language(Language::English);
     assert!(why.contains("11 × 8 inner corners"), "what is in sight is said: {why}");
     bench.click(import::Command::SetTarget("11x8x20".to_owned()));
     let hypotheses =
@@ -344,8 +344,8 @@ fn a_recording_becomes_a_session_in_the_window_once_a_person_has_said_what_the_f
     bench.until("a solution", |model| model.solve.fresh && model.solve.solved.is_some());
     let session = bench.model().session.folder.clone().expect("on the disk");
     assert!(session.starts_with(&sessions), "{}", session.display());
-    let said = std::fs::read_to_string(session.join("imported.toml")).expect("how it was understood");
-    assert!(said.contains("rotation = euler_zyx_321") && said.contains("given with --set"), "{said}");
+    let reported = std::fs::read_to_string(session.join("imported.toml")).expect("how it was understood");
+    assert!(reported.contains("rotation = euler_zyx_321") && reported.contains("given with --set"), "{reported}");
     assert!(bench.model().import.is_none(), "nothing is left open");
 }
 
@@ -366,7 +366,7 @@ fn images_alone_become_a_session_that_calibrates_the_camera_as_the_command_line_
     bench.until("what is there", |model| import(model).is_some_and(|import| import.trouble.is_some()));
     let found = import(bench.model()).and_then(|import| import.found).expect("images");
     let notes: Vec<String> =
-        found.looked.iter().flat_map(|looked| &looked.notes).map(|note| note.say(Language::English)).collect();
+        found.looked.iter().flat_map(|looked| &looked.notes).map(|note| note.in_language(Language::English)).collect();
     assert!(
         notes.iter().any(|note| note.contains("10 × 7 inner corners in 12")),
         "what is in sight is said: {notes:?}"

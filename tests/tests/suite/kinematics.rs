@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 const CONFIGURATIONS: usize = 1000;
 
 /// What we say of an arm: joints by name, values, and for these the tip's pose and the Jacobian in the axes of the base.
-fn said(file: &arms::ArmFile, rng: &mut ChaCha8Rng) -> Value {
+fn reported(file: &arms::ArmFile, rng: &mut ChaCha8Rng) -> Value {
     let arm = file.arm().expect("a good file");
     let names: Vec<&str> = arm.joints().iter().map(|joint| joint.name.as_str()).collect();
     let cases: Vec<Value> = (0..CONFIGURATIONS)
@@ -44,7 +44,7 @@ fn pinocchio_has_every_arm_where_we_have_it() {
     for file in arms::ALL {
         let path = |ending: &str| folder.path().join(format!("{}.{ending}", file.name));
         std::fs::write(path("urdf"), file.urdf).expect("written");
-        std::fs::write(path("json"), said(&file, &mut rng).to_string()).expect("written");
+        std::fs::write(path("json"), reported(&file, &mut rng).to_string()).expect("written");
     }
     let output = Command::new(python)
         .arg(workspace_root().join("tests/python/kinematics.py"))

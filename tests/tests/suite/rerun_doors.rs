@@ -67,17 +67,17 @@ fn connect(port: u16) -> TcpStream {
 
 /// Reads until there is a recording, or the end; what was read.
 fn read(socket: &mut TcpStream) -> Vec<u8> {
-    let mut said = Vec::new();
+    let mut reported = Vec::new();
     let mut piece = vec![0; 16 * 1024];
-    while said.len() < A_RECORDING {
+    while reported.len() < A_RECORDING {
         match socket.read(&mut piece) {
             Ok(0) => break,
-            Ok(count) => said.extend_from_slice(&piece[..count]),
+            Ok(count) => reported.extend_from_slice(&piece[..count]),
             Err(error) if error.kind() == ErrorKind::ConnectionReset => break,
-            Err(error) => panic!("{error} after {:?}", String::from_utf8_lossy(&said)),
+            Err(error) => panic!("{error} after {:?}", String::from_utf8_lossy(&reported)),
         }
     }
-    said
+    reported
 }
 
 /// Asks as a page does: the line with the status, and how much came.
@@ -88,8 +88,8 @@ fn asked_by_a_page(port: u16, headers: &str) -> (String, usize) {
          1\r\nContent-Length: 5\r\n\r\n\0\0\0\0\0"
     );
     socket.write_all(head.as_bytes()).expect("sent");
-    let said = read(&mut socket);
-    (String::from_utf8_lossy(&said).lines().next().unwrap_or_default().to_owned(), said.len())
+    let reported = read(&mut socket);
+    (String::from_utf8_lossy(&reported).lines().next().unwrap_or_default().to_owned(), reported.len())
 }
 
 /// A frame of HTTP/2 on stream 1, or on none for settings.
@@ -170,9 +170,9 @@ fn a_recording_is_not_given_to_pages_that_gave_this_machine_another_name() {
         let mut socket = connect(shown.port);
         let head = format!("GET /rerun/?x=1 HTTP/1.1\r\n{headers}\r\nConnection: close\r\n\r\n");
         socket.write_all(head.as_bytes()).expect("sent");
-        let said = String::from_utf8_lossy(&read(&mut socket)).into_owned();
-        assert!(said.lines().next().is_some_and(|line| line.contains(expected)), "{headers}: {said}");
-        assert_eq!(said.contains("the_canvas_id"), expected == " 200 ", "{headers}");
+        let reported = String::from_utf8_lossy(&read(&mut socket)).into_owned();
+        assert!(reported.lines().next().is_some_and(|line| line.contains(expected)), "{headers}: {reported}");
+        assert_eq!(reported.contains("the_canvas_id"), expected == " 200 ", "{headers}");
     }
 }
 

@@ -295,8 +295,8 @@ fn what_cannot_be_built_is_refused_by_name_and_what_coppeliasim_has_itself_is_na
         std::fs::write(&file, scene).expect("written");
         server.calls.clear();
         let output = run(&mut server, &python, &["--scene", file.to_str().expect("UTF-8")]);
-        let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said).into_owned());
-        (output.status.success(), server.calls.len(), said.concat())
+        let reported = [&output.stdout, &output.stderr].map(|reported| String::from_utf8_lossy(reported).into_owned());
+        (output.status.success(), server.calls.len(), reported.concat())
     };
     for (named, scene) in [
         ("robot.model", "[robot]\nmodel = 'ur5e'"),
@@ -321,18 +321,18 @@ fn what_cannot_be_built_is_refused_by_name_and_what_coppeliasim_has_itself_is_na
         ("does not know robot", "robot = 'ur5'"),
         ("Could not read", "[robot"),
     ] {
-        let (built, calls, said) = build(scene);
-        assert!(!built && calls == 0 && said.contains(named), "{scene}: {calls} calls, {said}");
-        assert!(!said.contains("Traceback"), "{scene}: {said}");
+        let (built, calls, reported) = build(scene);
+        assert!(!built && calls == 0 && reported.contains(named), "{scene}: {calls} calls, {reported}");
+        assert!(!reported.contains("Traceback"), "{scene}: {reported}");
     }
-    let (built, calls, said) = build(
+    let (built, calls, reported) = build(
         "[robot]\nrest_error_deg = 0.005\njoint_mode = 'kinematic'\n[image]\nsampling = 'centre'\n\
          [depth]\nnoise_mm = 0.01\noffset_px = 0.475\nnothing_m = 3.5000184\n[board.motion]\nspeed_m_s = 0.2\n",
     );
-    assert!(built && calls > 0, "{said}");
+    assert!(built && calls > 0, "{reported}");
     for field in
         ["robot.rest_error_deg", "image.sampling", "depth.noise_mm", "depth.offset_px", "depth.nothing_m", "speed_m_s"]
     {
-        assert!(said.contains(field), "{field} is not named: {said}");
+        assert!(reported.contains(field), "{field} is not named: {reported}");
     }
 }

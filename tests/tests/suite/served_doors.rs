@@ -183,9 +183,9 @@ fn wrong_keys_are_looked_at_no_more_after_some_and_an_open_port_is_warned_of() {
     assert!(answers[29].starts_with("HTTP/1.1 429"), "{}", answers[29]);
     assert!(guess(&key).starts_with("HTTP/1.1 429"), "one who waits learns nothing");
     served.child.kill().expect("it runs");
-    let mut said = String::new();
-    served.child.stderr.take().expect("its messages").read_to_string(&mut said).expect("text");
-    assert!(said.contains("warning: everybody on the network"), "{said}");
+    let mut reported = String::new();
+    served.child.stderr.take().expect("its messages").read_to_string(&mut reported).expect("text");
+    assert!(reported.contains("warning: everybody on the network"), "{reported}");
 }
 
 #[test]
@@ -199,8 +199,8 @@ fn it_ends_soon_after_it_was_asked_to_and_warns_of_nothing() {
     handeye_tests::process::signal(&served.child, "INT");
     let status = handeye_tests::process::end_of(&mut served.child);
     println!("ended by SIGINT after {:.2?}", asked.elapsed());
-    let mut said = String::new();
-    served.child.stderr.take().expect("its messages").read_to_string(&mut said).expect("text");
-    assert!(status.success(), "{status}: {said}");
-    assert!(!said.contains("WARN") && !said.contains("ERROR"), "{said}");
+    let mut reported = String::new();
+    served.child.stderr.take().expect("its messages").read_to_string(&mut reported).expect("text");
+    assert!(status.success(), "{status}: {reported}");
+    assert!(!reported.contains("WARN") && !reported.contains("ERROR"), "{reported}");
 }

@@ -55,14 +55,17 @@ fn a_reader_that_has_gone_is_no_failure_and_a_full_disk_is_one_line() {
     let (_home, session) = copy_of_session();
     for arguments in printing(&session) {
         let unread = run(command().args(&arguments).arg("-q").stdout(closed()).stderr(Stdio::piped()));
-        let said = text(&unread.stderr);
-        assert_eq!(unread.status.code(), Some(0), "{arguments:?}: {said}");
-        assert!(!said.contains("error") && !said.contains("panicked"), "{arguments:?}: {said}");
+        let reported = text(&unread.stderr);
+        assert_eq!(unread.status.code(), Some(0), "{arguments:?}: {reported}");
+        assert!(!reported.contains("error") && !reported.contains("panicked"), "{arguments:?}: {reported}");
         let lost = run(command().args(&arguments).arg("-q").stdout(full()).stderr(Stdio::piped()));
-        let said = text(&lost.stderr);
-        assert_eq!(lost.status.code(), Some(1), "{arguments:?}: {said}");
-        assert_eq!(said.lines().count(), 1, "{arguments:?}: {said}");
-        assert!(said.starts_with("error: standard output cannot be written: No space left"), "{arguments:?}: {said}");
+        let reported = text(&lost.stderr);
+        assert_eq!(lost.status.code(), Some(1), "{arguments:?}: {reported}");
+        assert_eq!(reported.lines().count(), 1, "{arguments:?}: {reported}");
+        assert!(
+            reported.starts_with("error: standard output cannot be written: No space left"),
+            "{arguments:?}: {reported}"
+        );
     }
 }
 
@@ -195,9 +198,9 @@ fn a_link_inside_of_a_session_is_never_written_through() {
         for arguments in [&["calibrate", path, "-q", "--out"][..], &["export", path, "-q", "--format", "json", "--out"]]
         {
             let output = handeye(&[arguments, &[utf8(out)]].concat());
-            let said = text(&output.stderr);
-            assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{arguments:?}: {said}");
-            assert!(said.contains("exports is a link"), "{said}");
+            let reported = text(&output.stderr);
+            assert_eq!((output.status.code(), reported.lines().count()), (Some(1), 1), "{arguments:?}: {reported}");
+            assert!(reported.contains("exports is a link"), "{reported}");
         }
     }
     assert_eq!(fs::read_to_string(&precious).expect("read"), "years of work");

@@ -73,9 +73,9 @@ impl<'a, 's> GuidedSequence<'a, 's> {
             let plan = match next {
                 Next::End(ending) => break (ending, observations, calibration),
                 Next::Go { plan, why } => {
-                    tracing::info!("{}", why.text().say(Language::English));
+                    tracing::info!("{}", why.text().in_language(Language::English));
                     if let Some(hold) = self.guide.hold() {
-                        tracing::info!("{}", hold.text().say(Language::English));
+                        tracing::info!("{}", hold.text().in_language(Language::English));
                     }
                     plan
                 }
@@ -87,7 +87,7 @@ impl<'a, 's> GuidedSequence<'a, 's> {
                 self.guide.failed();
             }
         };
-        tracing::info!("{}", ending.text().say(Language::English));
+        tracing::info!("{}", ending.text().in_language(Language::English));
         if calibration.is_some() {
             self.check(&observations, calibration.as_ref())?;
         }

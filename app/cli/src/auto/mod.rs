@@ -256,9 +256,10 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     solution.note(&recorder);
     rerun_arg::finish(recorder, &cancel)?;
     match ending {
-        Some(ending) if !ending.is_success() => {
-            Err(Failure::failed(anyhow::anyhow!("the goal is not reached. {}", ending.text().say(Language::English))))
-        }
+        Some(ending) if !ending.is_success() => Err(Failure::failed(anyhow::anyhow!(
+            "the goal is not reached. {}",
+            ending.text().in_language(Language::English)
+        ))),
         _ => Ok(()),
     }
 }

@@ -80,7 +80,7 @@ impl From<Trouble> for Failure {
         match trouble {
             Trouble::Port(error) => port_failure(&error),
             Trouble::Held(why) | Trouble::Failed(why) => {
-                Self::failed(anyhow::anyhow!("{}", why.say(Language::English)))
+                Self::failed(anyhow::anyhow!("{}", why.in_language(Language::English)))
             }
             Trouble::Paused => Self::failed(anyhow::anyhow!("the simulation is paused")),
             Trouble::Interrupted => Self::failed(anyhow::anyhow!("interrupted")),
@@ -115,7 +115,7 @@ impl PoseSequence<'_> {
         let Some(start) = self.plan.start_joints.clone().map(Goal::Joints) else { return Ok(()) };
         let gone = self.persisting("the start", |sequence| sequence.go_to("the start", &start))?;
         gone.map_err(|why| {
-            Failure::failed(anyhow::anyhow!("the arm does not go to the start: {}", why.say(Language::English)))
+            Failure::failed(anyhow::anyhow!("the arm does not go to the start: {}", why.in_language(Language::English)))
         })
     }
 
@@ -157,12 +157,12 @@ impl PoseSequence<'_> {
                 return Ok(Some((id, measured)));
             }
             Visit::Ended(CaptureEnd::Refused(refused)) if refused.kind.concerns_the_pose() => {
-                tracing::warn!("pose {name:?} is left out: {}", refused.why.say(Language::English));
+                tracing::warn!("pose {name:?} is left out: {}", refused.why.in_language(Language::English));
             }
             Visit::Ended(CaptureEnd::Refused(refused)) => {
-                return Err(Failure::failed(anyhow::anyhow!("{}", refused.why.say(Language::English))));
+                return Err(Failure::failed(anyhow::anyhow!("{}", refused.why.in_language(Language::English))));
             }
-            Visit::LeftOut(why) => tracing::warn!("pose {name:?} is left out: {}", why.say(Language::English)),
+            Visit::LeftOut(why) => tracing::warn!("pose {name:?} is left out: {}", why.in_language(Language::English)),
         }
         Ok(None)
     }
@@ -210,7 +210,7 @@ impl PoseSequence<'_> {
                     tries += 1;
                     tracing::warn!(
                         "on the way to {what}: {}. If this computer was asleep, that is why; going on, try {tries} of {TRIES}",
-                        error.why().say(Language::English)
+                        error.why().in_language(Language::English)
                     );
                     thread::sleep(BEFORE_TRY);
                     self.take_up_again().and_then(|()| work(self))
@@ -218,7 +218,7 @@ impl PoseSequence<'_> {
                 // A client that was killed is forgotten by the server within seconds, and with it what it holds.
                 Trouble::Held(why) if may_pass => {
                     tries += 1;
-                    let why = why.say(Language::English);
+                    let why = why.in_language(Language::English);
                     tracing::warn!("on the way to {what}: {why}. Trying once more, {tries} of {TRIES}");
                     self.take_up_again().and_then(|()| work(self))
                 }

@@ -33,8 +33,8 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
     let target = if is_session {
         Some(Session::open(path).map_err(Failure::unusable)?.document.meta.target)
     } else {
-        let said = result.provenance.options.get(TARGET_OPTION).cloned();
-        said.and_then(|value| serde_json::from_value(value).ok())
+        let reported = result.provenance.options.get(TARGET_OPTION).cloned();
+        reported.and_then(|value| serde_json::from_value(value).ok())
     };
     let board = result.estimate.as_ref().and_then(|estimate| estimate.board.as_ref());
     let print = result.estimate.as_ref().and_then(|estimate| estimate.print.as_ref());

@@ -19,7 +19,7 @@ use crate::open_cell::{OpenCell, port_failure};
 use crate::towards_board::TowardsBoard;
 use crate::{Failure, out, record};
 use handeye_record::Recorder;
-use handeye_workbench::model::{FollowStatus, FollowWish, Step, Tracked};
+use handeye_workbench::model::{FollowRequest, FollowStatus, Step, Tracked};
 use handeye_workbench::recording::{Entry, Recording as _};
 use handeye_workbench::session::start::REFERENCE_POSES;
 use handeye_workbench::text::Language;
@@ -43,7 +43,7 @@ pub enum Task {
     /// Nothing.
     Watch,
     /// It follows.
-    Follow(FollowWish),
+    Follow(FollowRequest),
     /// It moves once, when the board has been seen for a while.
     Reach {
         /// To this corner.
@@ -141,7 +141,7 @@ pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut
             }
             reach(cell, job, newest, index, stand_off_m, cancel)
         }
-        Task::Follow(wish) => follow_board(cell, job, &mut watch, wish),
+        Task::Follow(request) => follow_board(cell, job, &mut watch, request),
     }
 }
 
@@ -150,14 +150,14 @@ fn follow_board(
     cell: &mut OpenCell,
     job: &Job<'_>,
     watch: &mut Watch<'_, '_>,
-    wish: FollowWish,
+    request: FollowRequest,
 ) -> Result<(), Failure> {
     let (end, line) = (CancelToken::default(), Arc::clone(watch.line));
-    line.begin(wish);
+    line.begin(request);
     let mut arm = cell.another(watch.cancel)?;
     arm.go_no_faster_than(SHARE_OF_SPEED);
     let looks_for_board = job.own_cell.is_none();
-    let follower = Follower { cell: arm, wish, line: Arc::clone(&line), end: end.clone(), looks_for_board };
+    let follower = Follower { cell: arm, request, line: Arc::clone(&line), end: end.clone(), looks_for_board };
     let arm_thread = Builder::new().name("follow".to_owned()).spawn(move || follower.run()).map_err(Failure::failed)?;
     let watched = watch.run(cell, &|| arm_thread.is_finished());
     end.cancel();
@@ -177,7 +177,7 @@ fn follow_board(
         FollowEnd::Released => line.take_ended().unwrap_or_else(|| end_of_following(&FollowEnd::Released)),
         end => end_of_following(&end),
     };
-    let why = why.say(Language::English);
+    let why = why.in_language(Language::English);
     let error = Failure::failed(anyhow::anyhow!("following ended by itself: {why}{hint}"));
     summary.follow_ended = Some(why);
     Err(error)
@@ -213,7 +213,7 @@ fn moved(outcome: &Result<MotionOutcome, PortError>) -> Result<bool, Failure> {
         Ok(MotionOutcome::Arrived) => Ok(true),
         Ok(MotionOutcome::Stopped) => Ok(false),
         Ok(outcome) => {
-            let why = outcome.why().map_or_else(String::new, |why| why.say(Language::English));
+            let why = outcome.why().map_or_else(String::new, |why| why.in_language(Language::English));
             Err(Failure::failed(anyhow::anyhow!("{why}")))
         }
         Err(error) => Err(port_failure(error)),
@@ -263,7 +263,7 @@ impl Watch<'_, '_> {
             seen_s = Some(raw.sim_time_s);
             let Some(base_from_tip) = raw.base_from_tip else {
                 if std::mem::replace(&mut has_pose, false) {
-                    let why = raw.no_pose.map_or_else(String::new, |why| why.say(Language::English));
+                    let why = raw.no_pose.map_or_else(String::new, |why| why.in_language(Language::English));
                     tracing::warn!("an image is left out, because it is not known where the robot was: {why}");
                 }
                 continue;
@@ -342,7 +342,7 @@ impl Pause {
 /// The arm that follows, on a thread of its own.
 struct Follower {
     cell: OpenCell,
-    wish: FollowWish,
+    request: FollowRequest,
     line: Arc<FollowLine>,
     end: CancelToken,
     /// Whether the arm goes to where the board should be in view.
@@ -369,7 +369,7 @@ fn look_for_board(
         tracing::info!("the board is not in view here: the arm goes to {name}");
         match cell.move_to(name, &goal, cancel) {
             Ok(MotionOutcome::Refused(why) | MotionOutcome::Unreached(why)) => {
-                tracing::warn!("the arm does not go to {name}: {}", why.say(Language::English));
+                tracing::warn!("the arm does not go to {name}: {}", why.in_language(Language::English));
                 continue;
             }
             outcome if !moved(&outcome)? => return Ok(()),
@@ -390,17 +390,17 @@ impl Follower {
         while !self.line.is_seen() && !self.end.is_cancelled() && !self.is_running()? {
             is_seen_within(&self.line, &self.end, Some(LOOKED_FOR));
         }
-        let Self { mut cell, wish, line, end, looks_for_board } = self;
+        let Self { mut cell, request, line, end, looks_for_board } = self;
         if !line.is_seen() && looks_for_board && !end.is_cancelled() {
             look_for_board(&mut cell, &end, &mut |_| Ok(is_seen_within(&line, &end, Some(LOOKED_FOR))))?;
         }
         is_seen_within(&line, &end, None);
-        match cell.follow(&line, wish, &end)? {
+        match cell.follow(&line, request, &end)? {
             Ok(end) => Ok(end),
             // Following ends at its first pass.
             Err(MotionOutcome::Stopped) => Ok(FollowEnd::Released),
             Err(outcome) => {
-                let why = outcome.why().map_or_else(String::new, |why| why.say(Language::English));
+                let why = outcome.why().map_or_else(String::new, |why| why.in_language(Language::English));
                 Err(Failure::failed(anyhow::anyhow!("{why}")))
             }
         }

@@ -18,7 +18,7 @@ use crate::rerun_arg;
 use crate::{Failure, RerunArg, out, solve};
 use handeye_record::{Pace, RerunChoice};
 use handeye_workbench::arguments::heading;
-use handeye_workbench::model::{FollowWish, Tracked};
+use handeye_workbench::model::{FollowRequest, Tracked};
 use live::{Job, Summary, Taken, Task};
 
 /// At the end of its help.
@@ -106,9 +106,9 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     }
     let task = match (args.follow, args.corner, args.reach) {
         (_, _, Some(index)) => Task::Reach { index, stand_off_m },
-        (true, Some(index), None) => Task::Follow(FollowWish::Corner { index, stand_off_m }),
-        (true, None, None) if args.make_room => Task::Follow(FollowWish::KeepViewWithRoom),
-        (true, None, None) => Task::Follow(FollowWish::KeepView),
+        (true, Some(index), None) => Task::Follow(FollowRequest::Corner { index, stand_off_m }),
+        (true, None, None) if args.make_room => Task::Follow(FollowRequest::KeepViewWithRoom),
+        (true, None, None) => Task::Follow(FollowRequest::KeepView),
         (false, _, None) => Task::Watch,
     };
     if matches!(task, Task::Follow(_)) && (args.cell.driver.is_some() || args.cell.dry_run) {

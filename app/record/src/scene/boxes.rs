@@ -9,8 +9,8 @@ use super::pen::Pen;
 use super::style;
 
 /// Writes those that the cell says stand around and those of a person, in place of earlier ones.
-pub(super) fn write(pen: Pen<'_>, standing: &Surroundings, own: &Surroundings) -> Result<(), RecordError> {
-    pen.write(paths::STANDING, &boxes(&standing.obstacles).with_colors([style::STANDING]))?;
+pub(super) fn write(pen: Pen<'_>, scene_obstacles: &Surroundings, own: &Surroundings) -> Result<(), RecordError> {
+    pen.write(paths::STANDING, &boxes(&scene_obstacles.obstacles).with_colors([style::STANDING]))?;
     let names = own.obstacles.iter().map(|obstacle| obstacle.name.as_str());
     pen.write(paths::KEEP_OUT, &boxes(&own.obstacles).with_colors([style::KEEP_OUT]).with_labels(names))
 }

@@ -21,7 +21,7 @@ use super::paths::{self, below};
 use super::pen::{Clock, Instant, Pen};
 use super::style;
 use handeye_wording::text;
-use handeye_workbench::scene::{self, BAD_AT_MEDIANS, CaptureItem, Known, Standing, outcome};
+use handeye_workbench::scene::{self, BAD_AT_MEDIANS, CaptureItem, CaptureUse, Known, outcome};
 
 /// A capture that is in the recording.
 #[derive(Debug)]
@@ -164,7 +164,7 @@ impl Captures {
         let colour = if is_selected { style::SELECTED } else { colour(&item) };
         let path = paths::capture(record.id);
         let name = Points3D::new([[0.0_f32; 3]])
-            .with_labels([label(record.id, item.standing)])
+            .with_labels([label(record.id, item.used_as)])
             .with_colors([colour])
             .with_radii([Radius::new_ui_points(style::CORNER_UI_POINTS)]);
         pen.write(&path, &[&transform(base_from_camera.isometry()) as &dyn AsComponents, &name])?;
@@ -231,18 +231,18 @@ fn seen(known: &Known, corners: Option<&[Corner]>) -> Option<Pose<Camera, Target
 
 /// Its colour, unless it is selected.
 fn colour(item: &CaptureItem) -> Color {
-    match item.standing {
-        Standing::Excluded => style::EXCLUDED,
-        Standing::Aside => style::SET_ASIDE,
-        Standing::Fit | Standing::Verification => {
+    match item.used_as {
+        CaptureUse::Excluded => style::EXCLUDED,
+        CaptureUse::Rejected => style::SET_ASIDE,
+        CaptureUse::Fit | CaptureUse::Verification => {
             item.times_median.map_or(style::NEUTRAL, |times| style::residual_colour(times / BAD_AT_MEDIANS))
         }
     }
 }
 
 /// Its number, and that it was left out as an outlier where it was.
-fn label(id: CaptureId, standing: Standing) -> String {
-    if standing == Standing::Aside { format!("{id} (outlier)") } else { id.to_string() }
+fn label(id: CaptureId, used_as: CaptureUse) -> String {
+    if used_as == CaptureUse::Rejected { format!("{id} (outlier)") } else { id.to_string() }
 }
 
 #[cfg(test)]
@@ -251,12 +251,12 @@ mod tests {
 
     #[test]
     fn a_capture_that_was_set_aside_is_named_so_and_has_the_colour_of_a_warning() {
-        let item = |standing| CaptureItem { base_from_camera: None, standing, rms_px: None, times_median: Some(1.0) };
+        let item = |used_as| CaptureItem { base_from_camera: None, used_as, rms_px: None, times_median: Some(1.0) };
         let id = CaptureId(7);
-        assert_eq!(label(id, Standing::Aside), "7 (outlier)");
-        assert_eq!(colour(&item(Standing::Aside)), style::SET_ASIDE);
-        assert_eq!(label(id, Standing::Fit), "7");
-        assert_ne!(colour(&item(Standing::Fit)), style::SET_ASIDE);
-        assert_eq!(colour(&item(Standing::Excluded)), style::EXCLUDED);
+        assert_eq!(label(id, CaptureUse::Rejected), "7 (outlier)");
+        assert_eq!(colour(&item(CaptureUse::Rejected)), style::SET_ASIDE);
+        assert_eq!(label(id, CaptureUse::Fit), "7");
+        assert_ne!(colour(&item(CaptureUse::Fit)), style::SET_ASIDE);
+        assert_eq!(colour(&item(CaptureUse::Excluded)), style::EXCLUDED);
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use handeye_workbench::text::Text;
 
 /// Why something is not in the recording.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum RecordError {
     /// The stream did not take it.

@@ -21,7 +21,7 @@ pub(super) fn write_camera(pen: Pen<'_>, known: &Known, camera: Option<CameraIte
 pub(super) fn write_board(pen: Pen<'_>, known: &Known, board: Option<BoardItem>) -> Result<(), RecordError> {
     let Some(BoardItem { role, place, shape }) = board else { return Ok(()) };
     let path = match role {
-        Role::Predictor | Role::Said => paths::board(known.mode()),
+        Role::Predictor | Role::Reported => paths::board(known.mode()),
         Role::Tracked => paths::TRACKED_BOARD,
         Role::True => paths::TRUE_BOARD,
     };

@@ -153,14 +153,14 @@ impl SceneWriter {
                 pen.at(self.clock.now());
                 self.planned.write(pen, &self.known, poses)
             }
-            Entry::KeepOut { standing, own } => {
+            Entry::KeepOut { scene_obstacles, own } => {
                 pen.at(self.clock.now());
-                boxes::write(pen, standing, own)
+                boxes::write(pen, scene_obstacles, own)
             }
             Entry::Selected(ids) => self.selected(pen, ids),
             // The arrangement of the viewer is no part of the scene, see `blueprint`.
             Entry::Step(_) => Ok(()),
-            Entry::Said { severity, words } => {
+            Entry::Message { severity, words } => {
                 pen.at(self.clock.now());
                 let level = match severity {
                     Severity::Info => TextLogLevel::INFO,

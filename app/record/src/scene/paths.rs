@@ -75,7 +75,7 @@ pub const PLOT_TRACK_RATE: &str = "plots/track/rate";
 /// Speed of the tracked board [mm/s].
 pub const PLOT_TRACK_SPEED: &str = "plots/track/speed";
 
-/// What was said, with its severity.
+/// What was reported, with its severity.
 pub const LOG: &str = "log";
 /// The result for people, Markdown.
 pub const REPORT: &str = "report";

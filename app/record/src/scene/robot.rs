@@ -117,7 +117,7 @@ impl Trail {
         Self { path, colour, blocks: 0, newest: Vec::new() }
     }
 
-    /// Begins anew.
+    /// Begins again.
     pub fn restart(&mut self, pen: Pen<'_>) -> Result<(), RecordError> {
         if self.newest.is_empty() {
             return Ok(());

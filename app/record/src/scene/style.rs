@@ -62,7 +62,7 @@ pub const WAY: Color = colour(90, 200, 230);
 /// The colour of what is known in some way.
 pub(super) fn of(role: Role) -> Color {
     match role {
-        Role::Predictor | Role::Said => ESTIMATED,
+        Role::Predictor | Role::Reported => ESTIMATED,
         Role::Tracked => TRACKED,
         Role::True => TRUE,
     }

@@ -76,7 +76,7 @@ fn planned_poses_are_drawn_where_the_camera_will_be_and_go_when_they_are_over() 
     let paths: Vec<&str> = planned.keys().map(String::as_str).collect();
     assert_eq!(paths, ["/base/planned/0", "/base/planned/1", "/base/planned/2"]);
     assert!(planned.values().all(|entity| entity.components.iter().any(|it| it.contains("strips"))), "{planned:?}");
-    // One is left; the other two are written anew, empty.
+    // One is left; the other two are written again, empty.
     assert_eq!(bench.write(&Entry::Planned(vec![tip])).len(), 3);
     assert_eq!(bench.write(&Entry::Planned(Vec::new())).len(), 1);
 }
@@ -86,12 +86,14 @@ fn boxes_to_keep_clear_of_are_drawn_with_their_names_and_go_with_them() {
     let mut bench = Bench::new();
     bench.begin();
     let post = Obstacle::new("post", Isometry3::translation(0.4, 0.0, 0.2), [0.1, 0.1, 0.4]);
-    let standing = Arc::new(Surroundings::of(vec![post.clone()]));
-    let written =
-        bench.write(&Entry::KeepOut { standing: Arc::clone(&standing), own: Arc::new(Surroundings::of(vec![post])) });
+    let scene_obstacles = Arc::new(Surroundings::of(vec![post.clone()]));
+    let written = bench.write(&Entry::KeepOut {
+        scene_obstacles: Arc::clone(&scene_obstacles),
+        own: Arc::new(Surroundings::of(vec![post])),
+    });
     let labels = |path: &str| written[path].components.iter().any(|it| it.contains("labels"));
     assert!(labels("/base/around/keep_out") && !labels("/base/around/scene"), "{written:?}");
-    let none = bench.write(&Entry::KeepOut { standing, own: Arc::default() });
+    let none = bench.write(&Entry::KeepOut { scene_obstacles, own: Arc::default() });
     assert!(none.contains_key("/base/around/keep_out"), "written anew without a box: {none:?}");
 }
 
@@ -124,7 +126,7 @@ fn all(model: &Model) -> Vec<Entry> {
         entries.push(Entry::Observed { id: *id, observed: observed.clone().expect("read") });
     }
     entries.push(Entry::Solved(Arc::clone(model.solve.current().expect("solved"))));
-    entries.push(Entry::Said { severity: Severity::Info, words: "solved".to_owned() });
+    entries.push(Entry::Message { severity: Severity::Info, words: "solved".to_owned() });
     entries
 }
 

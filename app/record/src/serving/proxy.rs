@@ -27,9 +27,9 @@ pub(super) type Reader = MessageProxyServiceClient<MessageProxyServiceServer<Mes
 const ON_THE_WAY: usize = 8;
 
 /// Takes messages to a server.
-pub(super) struct ProxySink(mpsc::Sender<OnTheWay>);
+pub(super) struct ProxySink(mpsc::Sender<ProxyMessage>);
 
-enum OnTheWay {
+enum ProxyMessage {
     Message(Box<WriteMessagesRequest>),
     /// Everything before has arrived.
     Flush(SyncSender<()>),
@@ -47,8 +47,8 @@ pub(super) fn start(runtime: &Runtime, limit_bytes: u64) -> (ProxySink, Reader) 
     let reader = client.clone().max_decoding_message_size(MAX_DECODING_MESSAGE_SIZE);
     runtime.spawn(async move {
         let messages = ReceiverStream::new(messages).filter_map(|it| match it {
-            OnTheWay::Message(message) => Some(*message),
-            OnTheWay::Flush(arrived) => {
+            ProxyMessage::Message(message) => Some(*message),
+            ProxyMessage::Flush(arrived) => {
                 // Whoever asked may have gone.
                 let _told = arrived.try_send(()).is_ok();
                 None
@@ -70,7 +70,7 @@ impl LogSink for ProxySink {
                 return;
             }
         };
-        if self.0.blocking_send(OnTheWay::Message(Box::new(message))).is_err() {
+        if self.0.blocking_send(ProxyMessage::Message(Box::new(message))).is_err() {
             tracing::debug!("a message came after the server has ended");
         }
     }
@@ -78,7 +78,7 @@ impl LogSink for ProxySink {
     fn flush_blocking(&self, timeout: Duration) -> Result<(), SinkFlushError> {
         let (arrived, arrival) = sync_channel(1);
         // Once the server has ended nobody waits for anything.
-        let asked = self.0.blocking_send(OnTheWay::Flush(arrived)).is_ok();
+        let asked = self.0.blocking_send(ProxyMessage::Flush(arrived)).is_ok();
         match if asked { arrival.recv_timeout(timeout) } else { Ok(()) } {
             Err(RecvTimeoutError::Timeout) => Err(SinkFlushError::Timeout),
             Ok(()) | Err(RecvTimeoutError::Disconnected) => Ok(()),

@@ -24,20 +24,20 @@ fn call(url: &str, method: &str, headers: &str) -> (String, usize) {
     );
     socket.write_all(head.as_bytes()).expect("sent");
     socket.write_all(&[0; 5]).expect("sent");
-    let mut said = Vec::new();
+    let mut reported = Vec::new();
     let mut piece = [0; 4096];
     loop {
-        let end = said.windows(4).position(|four| four == b"\r\n\r\n");
+        let end = reported.windows(4).position(|four| four == b"\r\n\r\n");
         if let Some(end) = end {
-            let head = String::from_utf8_lossy(&said[..end]).into_owned();
-            let rest = said.len() - end - 4;
+            let head = String::from_utf8_lossy(&reported[..end]).into_owned();
+            let rest = reported.len() - end - 4;
             if !head.starts_with("HTTP/1.1 200") || rest > A_RECORDING {
                 return (head, rest);
             }
         }
         match socket.read(&mut piece).expect("an answer") {
-            0 => return (String::from_utf8_lossy(&said).into_owned(), 0),
-            count => said.extend_from_slice(&piece[..count]),
+            0 => return (String::from_utf8_lossy(&reported).into_owned(), 0),
+            count => reported.extend_from_slice(&piece[..count]),
         }
     }
 }

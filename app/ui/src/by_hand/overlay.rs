@@ -44,7 +44,7 @@ pub fn paint(painter: &Painter, model: &Model, target: &TargetSpec, place: &Plac
             }
         }
     }
-    let words = to_do(hand).say(model.view.language);
+    let words = to_do(hand).in_language(model.view.language);
     let at = Pos2::new(place.visible.center().x, place.visible.bottom() - 8.0);
     marks::plate_at(painter, (Align2::CENTER_BOTTOM, at), &words, WORDS, colour);
 }

@@ -48,10 +48,10 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, hand: &ByHand, outbox: &mut Outbo
         if matches!(hand.waits, HandWaits::Answer | HandWaits::Choice) {
             ui.add(Spinner::new().size(14.0).color(Palette::of(ui).busy));
         }
-        ui.label(RichText::new(to_do(hand).say(language)).strong().size(15.0));
+        ui.label(RichText::new(to_do(hand).in_language(language)).strong().size(15.0));
     });
     if let Some(why) = hand.wanted.as_ref().and_then(|wanted| wanted.why) {
-        parts::hint_ui(ui, &why.text().say(language));
+        parts::hint_ui(ui, &why.text().in_language(language));
     }
     let left = hand.wanted.as_ref().and_then(|wanted| wanted.views_left).filter(|views| *views > 0);
     error_ui(ui, model, hand.guide.guide(), left.map(|views| text!("about {n} more {n|pose|poses}", n = views)));

@@ -10,7 +10,7 @@ use handeye_estimate::{CornerResidual, ViewResult, ViewStatus};
 use handeye_session::{CaptureId, CaptureRecord, Document, Role};
 
 use handeye_workbench::model::{Model, Observed, Solved};
-use handeye_workbench::scene::{self, Standing};
+use handeye_workbench::scene::{self, CaptureUse};
 
 /// Cells of the image on which coverage is shown: as the findings judge it.
 pub const CELLS: (usize, usize) = (8, 6);
@@ -30,7 +30,7 @@ pub enum Detected {
 
 /// A capture that the estimate left out as an outlier, because it does not fit the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Aside {
+pub struct RejectedCapture {
     /// How far its board is from where the others put it \[mm\] and by how much it is turned \[deg\]; `None` where its corners
     /// are no image of the board.
     pub board_off: Option<(f64, f64)>,
@@ -60,7 +60,7 @@ pub struct CaptureRow {
     /// Noise of a corner of its image \[px\].
     pub corner_noise_px: Option<f64>,
     /// How far it is from the others, where the estimate set it aside.
-    pub aside: Option<Aside>,
+    pub aside: Option<RejectedCapture>,
     /// How many of its corners the estimate left out as an outlier.
     pub corners_aside: usize,
     /// What the calibration finds remarkable about it.
@@ -79,12 +79,12 @@ impl CaptureRow {
     }
 
     /// What it counts for.
-    pub fn standing(&self) -> Standing {
+    pub fn used_as(&self) -> CaptureUse {
         match (self.excluded, self.role) {
-            (true, _) => Standing::Excluded,
-            (false, Role::Verification) => Standing::Verification,
-            (false, Role::Calibration) if self.is_aside() => Standing::Aside,
-            (false, Role::Calibration) => Standing::Fit,
+            (true, _) => CaptureUse::Excluded,
+            (false, Role::Verification) => CaptureUse::Verification,
+            (false, Role::Calibration) if self.is_aside() => CaptureUse::Rejected,
+            (false, Role::Calibration) => CaptureUse::Fit,
         }
     }
 
@@ -151,7 +151,7 @@ impl Sources {
     }
 }
 
-/// The table of the model; made anew when captures, what was seen in them, or the calibration changed.
+/// The table of the model; made again when captures, what was seen in them, or the calibration changed.
 pub fn table(ctx: &Context, model: &Model) -> Arc<CaptureTable> {
     let id = Id::new("table of captures");
     let kept: Option<Arc<CaptureTable>> = ctx.data(|data| data.get_temp(id));
@@ -165,8 +165,8 @@ pub fn table(ctx: &Context, model: &Model) -> Arc<CaptureTable> {
 
 impl CaptureTable {
     /// How many captures there are that count for something.
-    pub fn count(&self, standing: Standing) -> usize {
-        self.rows.iter().filter(|row| row.standing() == standing).count()
+    pub fn count(&self, used_as: CaptureUse) -> usize {
+        self.rows.iter().filter(|row| row.used_as() == used_as).count()
     }
 
     fn new(model: &Model) -> Self {
@@ -260,10 +260,10 @@ fn add_solution(rows: &mut [CaptureRow], solved: &Solved) {
     }
 }
 
-fn aside(view: &ViewResult) -> Option<Aside> {
+fn aside(view: &ViewResult) -> Option<RejectedCapture> {
     let board_off = view.distance.map(|distance| (distance.metres * 1e3, distance.radians.to_degrees()));
     (view.status == ViewStatus::Outlier)
-        .then(|| Aside { board_off: board_off.filter(|(mm, deg)| mm.is_finite() && deg.is_finite()) })
+        .then(|| RejectedCapture { board_off: board_off.filter(|(mm, deg)| mm.is_finite() && deg.is_finite()) })
 }
 
 fn add_findings(rows: &mut [CaptureRow], document: &Document, findings: &[Finding]) {

@@ -32,13 +32,15 @@ pub(super) fn objects_ui(ui: &mut Ui, model: &Model, draft: &mut Draft, outbox: 
                     let width = ui.available_width().min(300.0);
                     ui.add(TextEdit::singleline(path).char_limit(400).desired_width(width).hint_text(hint))
                 });
-                let label = text!("Path: {part}", part = name).say(language);
+                let label = text!("Path: {part}", part = name).in_language(language);
                 field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &label));
             }
             let read = read(&typed);
             if let Err((part, why)) = &read {
                 let colour = Palette::of(ui).bad;
-                ui.add(Label::new(RichText::new(fault(*part, why, language).say(language)).color(colour)).wrap());
+                ui.add(
+                    Label::new(RichText::new(fault(*part, why, language).in_language(language)).color(colour)).wrap(),
+                );
             }
             ui.horizontal_wrapped(|ui| {
                 let new = read.ok().filter(|paths| *paths != model.objects);

@@ -90,7 +90,7 @@ pub fn connect_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         });
         if let Err(error) = wanted.inner {
             let colour = Palette::of(ui).bad;
-            ui.add(Label::new(RichText::new(Text::from(error).say(language)).color(colour)).wrap());
+            ui.add(Label::new(RichText::new(Text::from(error).in_language(language)).color(colour)).wrap());
         }
         if kind == Kind::Address {
             objects::objects_ui(ui, model, &mut draft.objects, outbox);
@@ -108,7 +108,7 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     form::heading_ui(ui, tr!(language, "Session"));
     let folder = model.session.folder.as_ref().unwrap_or(&model.sessions);
-    let said = if model.session.folder.is_some() {
+    let reported = if model.session.folder.is_some() {
         text!("Captures and results are kept in {folder}", folder = folder.display())
     } else {
         text!(
@@ -119,12 +119,12 @@ fn session_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if let (None, Some(last)) = (&model.session.folder, model.recent.first()) {
         let name = last.folder.file_name().unwrap_or(last.folder.as_os_str()).to_string_lossy();
         let words = text!("Open {name} again, {count} {count|capture|captures}", name = name, count = last.captures);
-        let button = Button::new(words.say(language)).wrap_mode(egui::TextWrapMode::Truncate);
+        let button = Button::new(words.in_language(language)).wrap_mode(egui::TextWrapMode::Truncate);
         if ui.add(button).on_hover_text(last.folder.display().to_string()).clicked() {
             outbox.send(session::Command::Open(last.folder.clone()));
         }
     }
-    parts::hint_ui(ui, &said.say(language));
+    parts::hint_ui(ui, &reported.in_language(language));
     ui.horizontal(|ui| {
         let words =
             if model.in_browser { tr!(language, "Download the folder") } else { tr!(language, "Open the folder") };
@@ -140,19 +140,19 @@ fn clocks_ui(ui: &mut Ui, model: &Model) {
     let Some([robot_from_camera_s, uncertainty_s]) = model.frame.as_ref().and_then(|frame| frame.info.clocks) else {
         return;
     };
-    let said = text!(
+    let reported = text!(
         "Clocks: {ms} ± {uncertainty} ms are added to time stamps of the camera to convert them to the robot's clock",
         ms = format!("{:.1}", robot_from_camera_s * 1e3),
         uncertainty = format!("{:.1}", uncertainty_s * 1e3)
     );
-    parts::hint_ui(ui, &said.say(model.view.language));
+    parts::hint_ui(ui, &reported.in_language(model.view.language));
 }
 
 /// How each connection is doing.
 fn state_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let status = status::connection(model);
-    form::note_ui(ui, status.tone, &status.title.say(language), &status.detail.say(language));
+    form::note_ui(ui, status.tone, &status.title.in_language(language), &status.detail.in_language(language));
     ui.horizontal_wrapped(|ui| {
         for (link, name) in [
             (Link::Control, tr!(language, "Robot")),
@@ -170,7 +170,7 @@ fn state_ui(ui: &mut Ui, model: &Model) {
                 font.clone(),
                 Align::Center,
             );
-            let words = RichText::new(words.say(language)).color(palette.tone(tone));
+            let words = RichText::new(words.in_language(language)).color(palette.tone(tone));
             words.append_to(&mut both, style, font, Align::Center);
             ui.add(Label::new(both).extend());
             ui.add_space(10.0);

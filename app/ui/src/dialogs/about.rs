@@ -16,7 +16,7 @@ pub fn about_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     ui.label(RichText::new("Handeye Workbench").size(TITLE).color(palette.text));
     let version = text!("Version {version}", version = env!("CARGO_PKG_VERSION"));
-    ui.label(RichText::new(version.say(language)).color(palette.weak));
+    ui.label(RichText::new(version.in_language(language)).color(palette.weak));
     parts::hint_ui(
         ui,
         tr!(

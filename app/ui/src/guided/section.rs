@@ -34,7 +34,7 @@ pub fn begin_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, hei
         outbox.send(guided::Command::CalibrateForMe);
     }
     if let Some(pose) = way_to_board(model, hindrance) {
-        let words = text!("Go to {name}", name = pose).say(language);
+        let words = text!("Go to {name}", name = pose).in_language(language);
         let what = tr!(
             language,
             "The board is not in the image here. This is the first of the taught poses, which look at it: go there, then let it \
@@ -86,10 +86,10 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
     let Some(guided) = sequence.guided.as_deref() else { return };
     if !model.sequence_runs {
         if let Some(message) = model.messages.standing_in(Pane::Poses) {
-            parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());
+            parts::notice_ui(ui, Tone::Warning, &message.text.in_language(language), |_| ());
         } else if let Some(ending) = guided.ending.as_ref().filter(|_| model.solve.fresh) {
             let tone = if ending.is_success() { Tone::Good } else { Tone::Warning };
-            parts::notice_ui(ui, tone, &ending.text().say(language), |_| ());
+            parts::notice_ui(ui, tone, &ending.text().in_language(language), |_| ());
         }
         return;
     }
@@ -97,15 +97,15 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
         if model.asked.is_none() {
             ui.add(Spinner::new().size(14.0).color(Palette::of(ui).busy));
         }
-        ui.label(RichText::new(under_way(model, sequence, guided).say(language)).strong());
+        ui.label(RichText::new(under_way(model, sequence, guided).in_language(language)).strong());
     });
     if let Some(why) = sequence.last_skipped() {
-        let said = text!("The pose before was left out: {why}", why = why.clone());
-        parts::notice_ui(ui, Tone::Warning, &said.say(language), |_| ());
+        let reported = text!("The pose before was left out: {why}", why = why.clone());
+        parts::notice_ui(ui, Tone::Warning, &reported.in_language(language), |_| ());
     }
     asked_ui(ui, model, outbox);
     if let Some(why) = &guided.why {
-        parts::hint_ui(ui, &why.text().say(language));
+        parts::hint_ui(ui, &why.text().in_language(language));
     }
     error_ui(ui, model, &guided.guide, left(model, sequence, guided));
     confirm_moves_ui(ui, model, outbox);
@@ -175,9 +175,9 @@ pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
         }
         (None, None) => return,
     };
-    let said = std::iter::once(error).chain(left).map(|text| text.say(language));
-    ui.label(said.collect::<Vec<_>>().join(" · "));
+    let reported = std::iter::once(error).chain(left).map(|text| text.in_language(language));
+    ui.label(reported.collect::<Vec<_>>().join(" · "));
     if let Some(hold) = guide.hold() {
-        parts::hint_ui(ui, &hold.text().say(language));
+        parts::hint_ui(ui, &hold.text().in_language(language));
     }
 }

@@ -8,8 +8,8 @@ use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::guided::state::{GuidedProgress, Waits};
 use handeye_workbench::model::{
-    self, ArmDoubt, AskedMove, BoxState, CapturePurpose, CellFacts, CellSource, Jog, LinkState, Model, Motion,
-    MotionGoal, Moves, PoseSequence, StopOutcome, WorkBox,
+    self, ArmDoubt, BoxState, CapturePurpose, CellFacts, CellSource, Jog, LinkState, Model, Motion, MotionGoal, Moves,
+    PendingMove, PoseSequence, StopOutcome, WorkBox,
 };
 use handeye_workbench::taught::update::reference_poses;
 use handeye_workbench::testing::sample;
@@ -142,8 +142,8 @@ fn the_error_over_a_box_that_was_chosen_stands_beside_the_goal() {
     let judged = model::judge_box(chosen, model.solve.current().expect("solved"), model.document());
     model.tip_box = BoxState { chosen, judged };
     let worst_mm = judged.expect("judged").1.worst_m * 1e3;
-    let said = format!("Expected error over the box {worst_mm:.3} mm (95 %), goal 0.300 mm");
-    assert!(pane(model.clone()).sees(&said));
+    let reported = format!("Expected error over the box {worst_mm:.3} mm (95 %), goal 0.300 mm");
+    assert!(pane(model.clone()).sees(&reported));
     model.tip_box.chosen = None;
     assert!(!pane(model).sees("over the box"));
 }
@@ -168,7 +168,7 @@ fn guided(model: &mut Model) -> &mut GuidedProgress {
 fn a_person_lets_the_arm_move_or_has_another_pose_chosen() {
     let mut model = under_way(Waits::Nothing, None);
     let what = Text::verbatim("pose G2");
-    model.asked = Some(AskedMove { goal: MotionGoal::Joints([0.0; 6].into()), what });
+    model.asked = Some(PendingMove { goal: MotionGoal::Joints([0.0; 6].into()), what });
     model.source = CellSource::Address("tcp://10.0.0.2:23000".to_owned());
     let mut waiting = pane(model.clone());
     assert!(waiting.sees("Pose 2 waits for you"));

@@ -60,7 +60,7 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
     let recording = &found.recording;
     parts::section_ui(ui, tr!(language, "What is there"));
     for belief in &recording.beliefs {
-        ui.label(RichText::new(belief.say(language)).color(Palette::of(ui).text));
+        ui.label(RichText::new(belief.in_language(language)).color(Palette::of(ui).text));
     }
     if let Some(looked) = found.looked.as_deref() {
         for (stream, seen, images) in &looked.seen {
@@ -70,14 +70,14 @@ fn files_ui(ui: &mut Ui, found: &Found, language: Language) {
                 images = images,
                 stream = stream
             );
-            ui.label(RichText::new(line.say(language)).color(Palette::of(ui).text));
+            ui.label(RichText::new(line.in_language(language)).color(Palette::of(ui).text));
         }
         for note in &looked.notes {
-            parts::hint_ui(ui, &note.say(language));
+            parts::hint_ui(ui, &note.in_language(language));
         }
     }
     for warning in &recording.warnings {
-        parts::hint_ui(ui, &warning.say(language));
+        parts::hint_ui(ui, &warning.in_language(language));
     }
 }
 
@@ -111,7 +111,7 @@ fn images_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Languag
                 let width = PREVIEW * size[0] as f32 / size[1].max(1) as f32;
                 let shown = ui.add(Image::new(&texture).fit_to_exact_size(Vec2::new(width, PREVIEW)));
                 let named = text!("Image {name}", name = image.shown());
-                shown.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, named.say(language)));
+                shown.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, named.in_language(language)));
                 parts::caption_ui(ui, &image.shown());
                 parts::caption_ui(ui, &pose.unwrap_or_else(|| "–".to_owned()));
             });
@@ -198,33 +198,33 @@ fn typed_ui(ui: &mut Ui, of: &Typed, import: &ImportState, language: Language, o
     let id = Id::new(("typed setting of the recording", of.key, &import.path));
     let known = || import.fixed.get(of.key).cloned().unwrap_or_default();
     let mut typed: String = ui.data_mut(|data| data.get_temp(id)).unwrap_or_else(known);
-    let label = of.label.say(language);
+    let label = of.label.in_language(language);
     parts::row_ui(ui, &label, |ui| {
         let field = TextEdit::singleline(&mut typed).desired_width(260.0).char_limit(400).hint_text(of.example);
         let response = ui.add(field);
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &label));
         let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        if ui.button(of.button.say(language)).clicked() || entered {
+        if ui.button(of.button.in_language(language)).clicked() || entered {
             let value = (!typed.trim().is_empty()).then(|| typed.trim().to_owned());
             outbox.send(import::Command::FixConvention { key: of.key.to_owned(), value });
         }
     });
     ui.data_mut(|data| data.insert_temp(id, typed));
-    parts::hint_ui(ui, &of.hint.say(language));
+    parts::hint_ui(ui, &of.hint.in_language(language));
 }
 
 /// The hypotheses.
 fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut Outbox) {
     parts::section_ui(ui, tr!(language, "Possible interpretations"));
     if let Some(work) = import.work {
-        let (said, part) = said_of(work);
-        if parts::progress_ui(ui, part, &said.say(language), tr!(language, "Cancel")) {
+        let (reported, part) = text_of(work);
+        if parts::progress_ui(ui, part, &reported.in_language(language), tr!(language, "Cancel")) {
             outbox.send(shell::Command::SetDialog(None));
         }
         return;
     }
     if let Some(why) = &import.trouble {
-        parts::notice_ui(ui, Tone::Warning, &why.say(language), |_| ());
+        parts::notice_ui(ui, Tone::Warning, &why.in_language(language), |_| ());
     }
     let Some(found) = import.found.as_deref() else {
         if import.trouble.is_some() {
@@ -236,8 +236,8 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
         if found.has_images() {
             parts::hint_ui(ui, tr!(language, "The camera alone can be calibrated with these images."));
         }
-        let formats = Text::list(understand::formats_said());
-        parts::hint_ui(ui, &text!("Formats that are read: {formats}", formats = formats).say(language));
+        let formats = Text::list(understand::formats_text());
+        parts::hint_ui(ui, &text!("Formats that are read: {formats}", formats = formats).in_language(language));
         return;
     };
     let (tone, verdict) = match &judgement.verdict {
@@ -264,9 +264,9 @@ fn meaning_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mu
             ),
         ),
     };
-    parts::notice_ui(ui, tone, &verdict.say(language), |_| ());
+    parts::notice_ui(ui, tone, &verdict.in_language(language), |_| ());
     if judgement.untried + judgement.sources_untried > 0 {
-        parts::hint_ui(ui, &understand::untried_said(judgement).say(language));
+        parts::hint_ui(ui, &understand::untried_text(judgement).in_language(language));
     }
     conventions::fixed_ui(ui, import, found, language, outbox);
     ui.horizontal_top(|ui| {
@@ -287,15 +287,15 @@ fn time_ui(ui: &mut Ui, import: &ImportState, language: Language, outbox: &mut O
     let now = import.time.as_secs();
     parts::row_ui(ui, tr!(language, "Time for reading"), |ui| {
         for seconds in READING_S {
-            let said = text!("{seconds} s", seconds = seconds).say(language);
-            if ui.radio(now == u64::from(seconds), said).clicked() {
+            let reported = text!("{seconds} s", seconds = seconds).in_language(language);
+            if ui.radio(now == u64::from(seconds), reported).clicked() {
                 outbox.send(import::Command::SetTime(seconds));
             }
         }
     });
 }
 
-fn said_of(work: ImportWork) -> (Text, f32) {
+fn text_of(work: ImportWork) -> (Text, f32) {
     let part = |done: usize, of: usize| done as f32 / of.max(1) as f32;
     match work {
         ImportWork::Looking(_, 0) => (text!("Reading the files"), 0.0),
@@ -334,9 +334,9 @@ fn list_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Language,
                 target = format!("{target:.0}"),
                 off = fit.disagreeing.len()
             );
-            parts::hint_ui(ui, &line.say(language));
+            parts::hint_ui(ui, &line.in_language(language));
             for why in &h.contradictions {
-                parts::hint_ui(ui, &why.say(language));
+                parts::hint_ui(ui, &why.in_language(language));
             }
         }
     }

@@ -78,7 +78,7 @@ fn found(hypotheses: Vec<Hypothesis>, verdict: Verdict) -> Found {
     };
     let recording = Recording {
         root: "/data/tuesday".into(),
-        beliefs: vec![stream.said(), track.said()],
+        beliefs: vec![stream.text(), track.text()],
         streams: vec![stream],
         tracks: vec![track],
         warnings: vec![Text::verbatim("image7.png is a copy of image3.png, byte by byte")],
@@ -189,10 +189,10 @@ fn the_size_of_images_that_no_file_tells_is_typed() {
         pane.steps();
         pane
     };
-    let said = "width and height of the images in pixels";
-    assert!(!corners((640, 480)).sees(said));
+    let reported = "width and height of the images in pixels";
+    assert!(!corners((640, 480)).sees(reported));
     let mut pane = corners((0, 0));
-    assert!(pane.sees(said) && pane.sees("no file says how large the images were"));
+    assert!(pane.sees(reported) && pane.sees("no file says how large the images were"));
     pane.harness.get_by_role_and_label(Role::TextInput, "Image size").click();
     pane.steps();
     pane.harness.get_by_role_and_label(Role::TextInput, "Image size").type_text("1280x720");
@@ -268,16 +268,16 @@ fn what_is_wrong_with_a_recording_is_said_in_chinese_to_its_end() {
         import::judge(&recording, &Sights::default(), &settings, &CancelToken::default()).expect("hypotheses");
     let chosen = judgement.hypotheses.iter().position(|h| !h.contradictions.is_empty()).expect("one is contradicted");
     let [warnings, contradictions] = [&recording.warnings, &judgement.hypotheses[chosen].contradictions]
-        .map(|said| said.iter().map(|text| text.say(Language::Chinese)).collect::<Vec<_>>());
+        .map(|reported| reported.iter().map(|text| text.in_language(Language::Chinese)).collect::<Vec<_>>());
     let mut pane = driven(Some(found_in(recording, judgement)), Some(chosen));
     pane.model().view.language = Language::Chinese;
     pane.steps();
     assert!(!warnings.is_empty() && !contradictions.is_empty());
-    for said in warnings.iter().chain(&contradictions) {
-        assert!(pane.sees(said), "{said}");
+    for reported in warnings.iter().chain(&contradictions) {
+        assert!(pane.sees(reported), "{reported}");
         let names = ["image3.png", "image0.png", "target_poses.txt", "poses.txt", "mm"];
-        let words = names.iter().fold(said.clone(), |words, name| words.replace(name, ""));
-        assert!(!words.contains(|letter: char| letter.is_ascii_alphabetic()), "{said}");
+        let words = names.iter().fold(reported.clone(), |words, name| words.replace(name, ""));
+        assert!(!words.contains(|letter: char| letter.is_ascii_alphabetic()), "{reported}");
     }
     assert!(contradictions[0].contains("poses.txt，第 3 行"), "{contradictions:?}");
 }

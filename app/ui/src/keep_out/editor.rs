@@ -48,7 +48,7 @@ pub fn header_ui(ui: &mut Ui, model: &Model) {
     let name = match model.keep_out.content.boxes.len() {
         _ if ui.available_width() < NAME => tr!(language, "Boxes").to_owned(),
         0 => tr!(language, "Keep-out boxes").to_owned(),
-        count => text!("Keep-out boxes: {count}", count = count).say(language),
+        count => text!("Keep-out boxes: {count}", count = count).in_language(language),
     };
     let what = tr!(language, "What the arm must not touch, besides what the cell says stands around it");
     let keep_out = &model.keep_out;
@@ -118,7 +118,7 @@ fn buttons_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let keep_out = &model.keep_out;
     for why in [&keep_out.fault, &keep_out.unkept, &keep_out.unsaved].into_iter().flatten() {
         let colour = Palette::of(ui).bad;
-        ui.add(Label::new(RichText::new(why.say(language)).color(colour)).wrap());
+        ui.add(Label::new(RichText::new(why.in_language(language)).color(colour)).wrap());
     }
 }
 
@@ -151,10 +151,10 @@ fn box_ui(ui: &mut Ui, entry: &mut KeepOutBox, number: usize, language: Language
     let mut goes = false;
     ui.horizontal(|ui| {
         let name = ui.add(TextEdit::singleline(&mut entry.name).char_limit(80).desired_width(130.0));
-        let label = text!("Name of box {number}", number = number).say(language);
+        let label = text!("Name of box {number}", number = number).in_language(language);
         name.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &label));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let what = text!("Delete box {number}", number = number).say(language);
+            let what = text!("Delete box {number}", number = number).in_language(language);
             let delete = ui.button(tr!(language, "Delete"));
             delete.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &what));
             goes = delete.clicked();
@@ -177,7 +177,7 @@ fn box_ui(ui: &mut Ui, entry: &mut KeepOutBox, number: usize, language: Language
                 .suffix("°")
                 .max_decimals(1),
         );
-        let label = text!("Yaw of box {number}", number = number).say(language);
+        let label = text!("Yaw of box {number}", number = number).in_language(language);
         drag.widget_info(|| WidgetInfo { label: Some(label.clone()), ..WidgetInfo::drag_value(true, yaw_deg) });
         if drag.changed() {
             entry.yaw_deg = (yaw_deg != 0.0).then_some(yaw_deg);
@@ -211,7 +211,7 @@ fn millimetres_ui(ui: &mut Ui, caption: &str, metres: &mut [f64; 3], least_mm: f
                 .max_decimals(0);
             let drag = ui.add_sized([54.0, ui.spacing().interact_size.y], drag);
             let label = text!("{what} of box {number} along {axis}, mm", what = caption, number = number, axis = axis)
-                .say(language);
+                .in_language(language);
             drag.widget_info(|| WidgetInfo { label: Some(label.clone()), ..WidgetInfo::drag_value(true, mm) });
             let drag = drag.on_hover_text(&label);
             // What the file has below a millimetre, or beyond the range, stays as it is until somebody changes it.

@@ -21,7 +21,7 @@ pub fn colour_bar_ui(ui: &mut Ui, map: ColourMap, range_m: [f32; 2], at_cursor_m
     let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     response.widget_info(|| {
         let (near, far) = (format!("{near_m:.2}"), format!("{far_m:.2}"));
-        let label = text!("Depth colours from {near} m to {far} m", near = near, far = far).say(language);
+        let label = text!("Depth colours from {near} m to {far} m", near = near, far = far).in_language(language);
         WidgetInfo::labeled(WidgetType::Image, true, label)
     });
     let bar = Rect::from_min_size(area.min + Vec2::new(0.0, 9.0), Vec2::new(area.width(), HEIGHT));

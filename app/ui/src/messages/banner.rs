@@ -21,8 +21,8 @@ pub fn banner_ui(ui: &mut Ui, status: &Status, language: Language, outbox: &mut 
             .show(ui, |ui| {
                 ui.set_min_width(ui.available_width());
                 ui.spacing_mut().item_spacing.y = 4.0;
-                ui.add(Label::new(RichText::new(status.title.say(language)).strong()).wrap());
-                ui.add(Label::new(RichText::new(status.detail.say(language)).color(palette.weak)).wrap());
+                ui.add(Label::new(RichText::new(status.title.in_language(language)).strong()).wrap());
+                ui.add(Label::new(RichText::new(status.detail.in_language(language)).color(palette.weak)).wrap());
                 action_ui(ui, status.action, language, outbox);
             });
     });

@@ -78,8 +78,8 @@ fn message_ui(ui: &mut Ui, message: &Message, language: Language) {
 
 fn words(message: &Message, language: Language) -> String {
     match message.times {
-        1 => message.text.say(language),
-        times => format!("{} ({times}×)", message.text.say(language)),
+        1 => message.text.in_language(language),
+        times => format!("{} ({times}×)", message.text.in_language(language)),
     }
 }
 

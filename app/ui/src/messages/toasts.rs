@@ -57,24 +57,24 @@ pub fn toasts_ui(ui: &mut Ui, model: &Model, layout: &Layout, outbox: &mut Outbo
     let room = ui.available_rect_before_wrap();
     let mut bottom = room.bottom();
     for message in up(model, layout) {
-        let said = said(message, language);
-        let galley = galley(ui, &said, room.width() - LEFT - RIGHT);
+        let reported = reported(message, language);
+        let galley = galley(ui, &reported, room.width() - LEFT - RIGHT);
         let height = galley.size().y + 2.0 * ABOVE;
         if bottom - height < room.top() {
             return;
         }
         let rect = Rect::from_min_max(egui::pos2(room.left(), bottom - height), egui::pos2(room.right(), bottom));
         bottom -= height + BETWEEN;
-        if toast_ui(ui, rect, message, &said, galley, language) {
+        if toast_ui(ui, rect, message, &reported, galley, language) {
             outbox.send(messages::Command::Dismiss(message.number));
         }
     }
 }
 
-fn said(message: &Message, language: Language) -> String {
+fn reported(message: &Message, language: Language) -> String {
     match message.times {
-        1 => message.text.say(language),
-        times => format!("{} ({times}×)", message.text.say(language)),
+        1 => message.text.in_language(language),
+        times => format!("{} ({times}×)", message.text.in_language(language)),
     }
 }
 
@@ -86,7 +86,14 @@ fn galley(ui: &Ui, text: &str, width: f32) -> Arc<Galley> {
 }
 
 /// One message; whether it is put aside.
-fn toast_ui(ui: &mut Ui, rect: Rect, message: &Message, said: &str, galley: Arc<Galley>, language: Language) -> bool {
+fn toast_ui(
+    ui: &mut Ui,
+    rect: Rect,
+    message: &Message,
+    reported: &str,
+    galley: Arc<Galley>,
+    language: Language,
+) -> bool {
     let palette = Palette::of(ui);
     let colour = match message.severity {
         Severity::Info => palette.accent,
@@ -94,7 +101,7 @@ fn toast_ui(ui: &mut Ui, rect: Rect, message: &Message, said: &str, galley: Arc<
     };
     let id = ui.id().with(("toast", message.number));
     let card = ui.interact(rect, id, Sense::hover());
-    card.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, said));
+    card.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, reported));
     let (radius, edge) = (CornerRadius::same(CARD_RADIUS), Stroke::new(1.0, palette.edge));
     ui.painter().rect(rect, radius, palette.raised(), edge, StrokeKind::Inside);
     let bar = Rect::from_min_size(rect.min + Vec2::new(5.0, ABOVE), Vec2::new(3.0, rect.height() - 2.0 * ABOVE));
@@ -105,7 +112,7 @@ fn toast_ui(ui: &mut Ui, rect: Rect, message: &Message, said: &str, galley: Arc<
     cross.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tr!(language, "Dismiss")));
     let ink = if cross.hovered() || cross.has_focus() { palette.text } else { palette.weak };
     icons::draw(ui.painter(), Icon::Close, corner, 10.0, ink);
-    card.on_hover_text(said);
+    card.on_hover_text(reported);
     cross.clicked()
 }
 

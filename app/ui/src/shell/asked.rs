@@ -18,11 +18,11 @@ pub fn asked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let Some(asked) = &model.asked else { return };
     let language = model.view.language;
     let what = asked.what.clone();
-    let said = match Way::to(&asked.goal, model) {
-        Some(way) => text!("The arm waits to move to {what}: {way}", what = what, way = way.said(model)),
+    let reported = match Way::to(&asked.goal, model) {
+        Some(way) => text!("The arm waits to move to {what}: {way}", what = what, way = way.text(model)),
         None => text!("The arm waits to move to {what}", what = what),
     };
-    parts::notice_ui(ui, Tone::Busy, &said.say(language), |ui| {
+    parts::notice_ui(ui, Tone::Busy, &reported.in_language(language), |ui| {
         let hindrance = unmovable(model).or_else(|| match model.motion {
             Motion::Idle => None,
             _ => Some(tr!(language, "The arm is moving: wait until it stands, or stop it")),

@@ -40,7 +40,7 @@ fn step_ui(ui: &mut Ui, index: usize, status: &StepStatus, is_next: bool, langua
     let palette = Palette::of(ui);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), ROW), Sense::click());
     let name = crate::shell::step_name(status.step, language);
-    let line = status.line.say(language);
+    let line = status.line.in_language(language);
     response.widget_info(|| {
         let label = format!("{} {name}: {} ({line})", index + 1, state_name(status.state, language));
         WidgetInfo::labeled(WidgetType::Button, true, label)

@@ -85,14 +85,14 @@ pub fn skipped_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence) {
     let mut reasons: Vec<(&Text, Vec<&str>)> = Vec::new();
     for (name, outcome) in sequence.names.iter().zip(&sequence.outcomes) {
         let StopOutcome::Skipped(why) = outcome else { continue };
-        match reasons.iter_mut().find(|(said, _)| *said == why) {
+        match reasons.iter_mut().find(|(reported, _)| *reported == why) {
             Some((_, names)) => names.push(name),
             None => reasons.push((why, vec![name])),
         }
     }
     for (why, names) in reasons {
-        let said = text!("Skipped {names}: {why}", names = names.join(", "), why = why.clone());
-        parts::caption_ui(ui, &said.say(model.view.language));
+        let reported = text!("Skipped {names}: {why}", names = names.join(", "), why = why.clone());
+        parts::caption_ui(ui, &reported.in_language(model.view.language));
     }
 }
 
@@ -104,7 +104,7 @@ pub fn visits_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &m
     if model.sequence_runs || is_whole {
         return;
     }
-    parts::hint_ui(ui, &went(sequence).say(model.view.language));
+    parts::hint_ui(ui, &went(sequence).in_language(model.view.language));
     skipped_ui(ui, model, sequence);
     ui.horizontal_wrapped(|ui| home_ui(ui, model, outbox));
 }
@@ -113,12 +113,12 @@ pub fn visits_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &m
 pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
     let language = model.view.language;
     let (done, of) = (sequence.outcomes.len(), sequence.names.len());
-    let said = match sequence.current() {
+    let reported = match sequence.current() {
         Some(name) => text!("Pose {n} of {of}: {name}", n = done + 1, of = of, name = name),
         None => text!("{of} {of|pose was|poses were} visited", of = of),
     }
-    .say(language);
-    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &said, tr!(language, "Stop the sequence")) {
+    .in_language(language);
+    if parts::progress_ui(ui, done as f32 / of.max(1) as f32, &reported, tr!(language, "Stop the sequence")) {
         outbox.send(taught::Command::StopSequence);
     }
     asked_ui(ui, model, outbox);
@@ -126,7 +126,7 @@ pub fn progress_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: 
 
 /// How the last one went, and the button that goes on with it where poses are left.
 pub fn summary_ui(ui: &mut Ui, model: &Model, sequence: &PoseSequence, outbox: &mut Outbox) {
-    parts::hint_ui(ui, &went(sequence).say(model.view.language));
+    parts::hint_ui(ui, &went(sequence).in_language(model.view.language));
     continue_ui(ui, model, sequence, outbox);
 }
 

@@ -47,7 +47,7 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         rotation_ui(ui, model, colour, outbox);
         field_ui(
             ui,
-            &joints_caption(model).say(language),
+            &joints_caption(model).in_language(language),
             &robot.map_or_else(|| UNKNOWN.to_owned(), |robot| joints_shown(model, robot)),
             &[WIDEST_ANGLE; MAX_JOINTS][..joint_count(model)].join("  "),
             colour,
@@ -67,7 +67,7 @@ pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let age = model.frame_age_s().map_or_else(|| UNKNOWN.to_owned(), age_text);
         field_ui(ui, tr!(language, "Image age"), &age, "88.8 s", if stale { palette.warning } else { palette.text });
         if let Some(age) = robot_age.filter(|_| robot.is_some()) {
-            field_ui(ui, tr!(language, "Robot"), &age.say(language), "", palette.warning);
+            field_ui(ui, tr!(language, "Robot"), &age.in_language(language), "", palette.warning);
         }
     });
     ui.add_space(2.0);
@@ -141,13 +141,13 @@ fn rotation_ui(ui: &mut Ui, model: &Model, colour: egui::Color32, outbox: &mut O
 fn message_ui(ui: &mut Ui, model: &Model) {
     let palette = Palette::of(ui);
     let language = model.view.language;
-    let (colour, said) = if let Some(text) = under_way(model) {
-        (palette.busy, text.say(language))
+    let (colour, reported) = if let Some(text) = under_way(model) {
+        (palette.busy, text.in_language(language))
     } else {
         let fresh = model.messages.status_line().filter(|message| model.now_s - message.at_s < FRESH_S);
-        (palette.severity(Severity::Info), fresh.map(|message| message.text.say(language)).unwrap_or_default())
+        (palette.severity(Severity::Info), fresh.map(|message| message.text.in_language(language)).unwrap_or_default())
     };
-    ui.add(Label::new(RichText::new(said).color(colour)).truncate());
+    ui.add(Label::new(RichText::new(reported).color(colour)).truncate());
 }
 
 /// What the program does now, what was asked for before what comes of it.

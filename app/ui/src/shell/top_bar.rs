@@ -68,8 +68,8 @@ fn connection_ui(ui: &mut Ui, status: &Status, language: Language) {
     let room = (ui.available_width() - 230.0).max(60.0);
     ui.scope(|ui| {
         ui.set_max_width(room);
-        ui.add(Label::new(status.title.say(language)).truncate().sense(Sense::hover()))
-            .on_hover_text(status.detail.say(language));
+        ui.add(Label::new(status.title.in_language(language)).truncate().sense(Sense::hover()))
+            .on_hover_text(status.detail.in_language(language));
     });
 }
 
@@ -79,14 +79,14 @@ fn frame_rate_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let text = match model.frame_age_s() {
         Some(age_s) if age_s > STALE_AFTER_S => tr!(language, "no new images").to_owned(),
-        _ => text!("{rate} fps", rate = format!("{:.0}", frame.info.rate_hz)).say(language),
+        _ => text!("{rate} fps", rate = format!("{:.0}", frame.info.rate_hz)).in_language(language),
     };
     ui.label(RichText::new("·").color(palette.weak));
     let what = text!(
         "Images that arrive per second. The window draws the newest; {count} were replaced by a newer one before they were drawn",
         count = model.dropped_frames
     );
-    ui.label(RichText::new(text).color(palette.weak)).on_hover_text(what.say(language));
+    ui.label(RichText::new(text).color(palette.weak)).on_hover_text(what.in_language(language));
 }
 
 fn session_ui(ui: &mut Ui, session: &SessionFacts, language: Language) {
@@ -130,8 +130,8 @@ fn history_ui(
 ) {
     let response = icon_button_ui(ui, icon, name, step.is_some());
     let hint = match step {
-        Some(step) => text!("{what}: {step}", what = name, step = step.say(language)).say(language),
-        None => text!("{what}: nothing", what = name).say(language),
+        Some(step) => text!("{what}: {step}", what = name, step = step.in_language(language)).in_language(language),
+        None => text!("{what}: nothing", what = name).in_language(language),
     };
     if response.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked() {
         outbox.send(command);

@@ -20,9 +20,9 @@ pub fn status_ui(ui: &mut Ui, status: &Status, language: Language, outbox: &mut 
     centred_ui(ui, TEXT_HEIGHT, |ui| {
         sign_ui(ui, status.tone);
         ui.add_space(14.0);
-        ui.add(Label::new(theme::title(status.title.say(language), TITLE).color(palette.text)).wrap());
+        ui.add(Label::new(theme::title(status.title.in_language(language), TITLE).color(palette.text)).wrap());
         ui.add_space(6.0);
-        ui.add(Label::new(RichText::new(status.detail.say(language)).color(palette.weak)).wrap());
+        ui.add(Label::new(RichText::new(status.detail.in_language(language)).color(palette.weak)).wrap());
         ui.add_space(14.0);
         action_ui(ui, status.action, language, outbox);
     });

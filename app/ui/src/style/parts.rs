@@ -138,14 +138,14 @@ pub fn gated_ui(ui: &mut Ui, reason: Option<&str>, button: Button<'_>) -> Respon
 }
 
 /// A bar of progress, 0 to 1, with what it says aloud and a button that ends it; tells whether that was clicked.
-pub fn progress_ui(ui: &mut Ui, part: f32, said: &str, end: &str) -> bool {
-    ui.label(RichText::new(said).color(Palette::of(ui).text));
+pub fn progress_ui(ui: &mut Ui, part: f32, reported: &str, end: &str) -> bool {
+    ui.label(RichText::new(reported).color(Palette::of(ui).text));
     ui.horizontal(|ui| {
         // From the right, so that the bar gets what the button leaves.
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let clicked = ui.button(end).clicked();
             let bar = ProgressBar::new(part).desired_width(ui.available_width()).desired_height(10.0);
-            ui.add(bar).widget_info(|| WidgetInfo::labeled(WidgetType::ProgressIndicator, true, said));
+            ui.add(bar).widget_info(|| WidgetInfo::labeled(WidgetType::ProgressIndicator, true, reported));
             clicked
         })
         .inner
@@ -156,9 +156,9 @@ pub fn progress_ui(ui: &mut Ui, part: f32, said: &str, end: &str) -> bool {
 /// A button that puts a text on the clipboard; `what` tells it from others.
 pub fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl FnOnce() -> String) {
     let response = ui.add(small_button(ui, tr!(language, "Copy")));
-    let said = handeye_wording::text!("Copy {what}", what = what).say(language);
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &said));
-    if response.on_hover_text(said).clicked() {
+    let reported = handeye_wording::text!("Copy {what}", what = what).in_language(language);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &reported));
+    if response.on_hover_text(reported).clicked() {
         ui.ctx().copy_text(text());
     }
 }

@@ -113,7 +113,7 @@ pub fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let width = ui.available_width().min(300.0);
         drawing_ui(ui, target, Vec2::new(width, 150.0), language);
     }
-    parts::hint_ui(ui, &hint(target).say(language));
+    parts::hint_ui(ui, &hint(target).in_language(language));
     if target.is_symmetric() {
         let title = tr!(language, "This board looks the same after half a turn");
         let detail = match target {
@@ -245,13 +245,13 @@ fn april_grid_ui(ui: &mut Ui, board: &mut AprilGrid, language: Language) {
 fn border_ui(ui: &mut Ui, bits: &mut Option<usize>, language: Language) {
     choice_ui(ui, tr!(language, "Black border"), bits, [None, Some(1), Some(2)], |bits| match bits {
         None => tr!(language, "told from the images").to_owned(),
-        Some(bits) => text!("{bits} {bits|bit|bits}", bits = bits).say(language),
+        Some(bits) => text!("{bits} {bits|bit|bits}", bits = bits).in_language(language),
     });
 }
 
 fn family_ui(ui: &mut Ui, name: &str, family: &mut Dictionary, language: Language) {
     choice_ui(ui, name, family, Dictionary::all(), |family| {
-        text!("{family} ({count})", family = family.to_string(), count = family.markers()).say(language)
+        text!("{family} ({count})", family = family.to_string(), count = family.markers()).in_language(language)
     });
 }
 

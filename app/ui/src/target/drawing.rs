@@ -23,7 +23,7 @@ pub fn drawing_ui(ui: &mut Ui, target: &TargetSpec, room: Vec2, language: Langua
         WidgetInfo::labeled(
             WidgetType::Image,
             true,
-            text!("Drawing of the board: {board}", board = target.said()).say(language),
+            text!("Drawing of the board: {board}", board = target.text()).in_language(language),
         )
     });
     let Some(drawing) = drawing(ui, target) else { return };

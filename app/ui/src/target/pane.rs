@@ -85,7 +85,7 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         form::row_ui(ui, caption, |ui| {
             for (name, value) in [first, second] {
                 let value = DragValue::new(value).speed(0.1).max_decimals(4).prefix(format!("{name} ")).suffix(" px");
-                number_ui(ui, name, value).on_hover_text(text!("{name} in pixels", name = name).say(language));
+                number_ui(ui, name, value).on_hover_text(text!("{name} in pixels", name = name).in_language(language));
             }
         });
     }
@@ -95,7 +95,12 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         outbox.send(session::Command::SetCamera(Some(known)));
     }
     if let Err(error) = now.validate() {
-        form::note_ui(ui, Tone::Bad, tr!(language, "These intrinsics cannot be"), &Text::from(error).say(language));
+        form::note_ui(
+            ui,
+            Tone::Bad,
+            tr!(language, "These intrinsics cannot be"),
+            &Text::from(error).in_language(language),
+        );
     }
 }
 

@@ -20,7 +20,7 @@ use crate::command::{Command, Event, Outbox};
 use crate::guided::update::guided_step;
 use crate::keep_out::update::{keep_keep_out, send_keep_out};
 use crate::model::{CellSource, Drivers, Model, Severity, ViewSettings};
-use crate::motion::rest::{stop_asked, stop_waits};
+use crate::motion::rest::{stop_requested, stop_waits};
 use crate::recording::Recording;
 use crate::recording::recorded::Recorded;
 use crate::scene::update::fit_scene;
@@ -168,7 +168,7 @@ impl App {
     fn take_outside_stops(&mut self) {
         let pressed = self.stop_line().outside();
         if std::mem::replace(&mut self.outside_stops, pressed) < pressed {
-            stop_asked(&mut self.cx.model, &self.cx.workers);
+            stop_requested(&mut self.cx.model, &self.cx.workers);
         }
     }
 

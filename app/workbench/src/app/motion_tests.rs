@@ -3,7 +3,7 @@
 use handeye_cell::scene::{SceneChoice, ShippedScene};
 use handeye_dataset::taught_poses::{Goal, TaughtPose};
 
-use super::tests::{bench, said};
+use super::tests::{bench, reported};
 use super::*;
 use crate::model::{CapturePurpose, Drivers, JointFacts, Motion, MotionOutcome, Moves, StopOutcome};
 use crate::testing::sample;
@@ -84,7 +84,7 @@ fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() 
     app.apply(taught::Command::RunSequence { purpose: None });
     let asked = app.model().asked.clone().expect("the first move waits");
     assert_eq!(app.model().motion, Motion::Idle);
-    assert_eq!(asked.what.say(Language::English), "pose left");
+    assert_eq!(asked.what.in_language(Language::English), "pose left");
 
     app.apply(motion::Command::ConfirmMove);
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
@@ -133,7 +133,7 @@ fn poses_to_verify_at_and_moves_to_a_place_by_its_name_are_asked_for_as_well() {
     let asked = app.model().asked.clone().expect("it waits");
     let way = crate::motion::way::Way::to(&asked.goal, app.model()).expect("connected");
     assert!(way.joint.is_some_and(|(joint, far)| joint == 0 && (far - 0.7).abs() < 1e-9));
-    assert!(way.said(app.model()).say(Language::English).contains("the joint that moves most is J1, by 40.1°"));
+    assert!(way.text(app.model()).in_language(Language::English).contains("the joint that moves most is J1, by 40.1°"));
     app.apply(motion::Command::SkipMove);
     assert_eq!((&app.model().motion, &app.model().asked), (&Motion::Idle, &None));
 
@@ -179,7 +179,7 @@ fn an_arm_is_said_to_be_stopped_when_its_states_say_so_and_an_alarm_has_the_numb
         let mut robot = app.model().robot.clone().expect("connected");
         app.apply(motion::Command::Stop);
         app.absorb(motion::Event::Stopped);
-        assert!(app.model().stop_pending && !said(app).contains("stays where it is"), "{}", said(app));
+        assert!(app.model().stop_pending && !reported(app).contains("stays where it is"), "{}", reported(app));
         for i in 1..=22 {
             let now_s = app.model().now_s + 0.1;
             robot.sim_time_s += 0.1;
@@ -193,12 +193,12 @@ fn an_arm_is_said_to_be_stopped_when_its_states_say_so_and_an_alarm_has_the_numb
         if goes_on {
             assert_eq!(newest.severity, Severity::Error);
             assert!(
-                said(app).contains("joint 1 from 5.7° to −") && said(app).contains("emergency stop"),
+                reported(app).contains("joint 1 from 5.7° to −") && reported(app).contains("emergency stop"),
                 "{}",
-                said(app)
+                reported(app)
             );
         } else {
-            assert_eq!(said(app), "Arm stopped: every joint stays where it is");
+            assert_eq!(reported(app), "Arm stopped: every joint stays where it is");
         }
     }
 }
@@ -212,5 +212,5 @@ fn without_states_nobody_says_that_the_arm_stands() {
     app.replace_model(model);
     app.absorb(motion::Event::Stopped);
     app.absorb(Event::Tick { now_s: app.model().now_s + 2.5 });
-    assert!(said(app).contains("it is not known whether it has"), "{}", said(app));
+    assert!(reported(app).contains("it is not known whether it has"), "{}", reported(app));
 }

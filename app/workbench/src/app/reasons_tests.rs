@@ -14,7 +14,10 @@ const MANUAL: &str = "The robot refuses: the pendant is in manual mode";
 
 /// What stands in a pane, which is in the log as well.
 fn standing(app: &App, pane: Pane) -> String {
-    app.model().messages.standing_in(pane).map_or_else(String::new, |message| message.text.say(Language::English))
+    app.model()
+        .messages
+        .standing_in(pane)
+        .map_or_else(String::new, |message| message.text.in_language(Language::English))
 }
 
 fn moved(app: &mut App, outcome: MotionOutcome) {

@@ -15,7 +15,7 @@ use crate::by_hand::state::HandWaits;
 use crate::by_hand::update::captured_by_hand;
 use crate::guided::state::{Choice, ChosenStep, Waits};
 use crate::model::{
-    ArmDoubt, ByHand, CapturePurpose, CaptureRefused, CellFacts, DepthScale, Dialog, FollowStatus, FollowWish, Home,
+    ArmDoubt, ByHand, CapturePurpose, CaptureRefused, CellFacts, DepthScale, Dialog, FollowRequest, FollowStatus, Home,
     JobId, Jog, Link, LinkState, LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind,
     RobotState, SceneView, SolveStatus, StopOutcome, ThemeChoice, WorkBox,
 };
@@ -55,8 +55,8 @@ fn bench_with(connect: Connect) -> Bench {
     Bench { app: App::start(start, connect, clock, waker).expect("threads"), _sessions: sessions }
 }
 
-pub(super) fn said(app: &App) -> String {
-    app.model().messages.newest().map_or_else(String::new, |message| message.text.say(Language::English))
+pub(super) fn reported(app: &App) -> String {
+    app.model().messages.newest().map_or_else(String::new, |message| message.text.in_language(Language::English))
 }
 
 /// A scene is read when a connection is made, so another scene takes another connection; the built-in cell has one scene, and
@@ -123,10 +123,10 @@ fn a_lost_connection_is_said_and_a_retry_does_not_hide_why() {
     bench.app.absorb(connect::Event::Link { link: Link::Camera, state: connected });
     let lost = LinkState::Lost { since_s: 1.0, why: why.clone(), attempt: 0, next_s: 1.5 };
     bench.app.absorb(connect::Event::Link { link: Link::Camera, state: lost });
-    assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
+    assert_eq!(reported(&bench.app), "Camera connection lost: the cable is out");
     let retrying = LinkState::Retrying { since_s: 1.0, why, attempt: 1 };
     bench.app.absorb(connect::Event::Link { link: Link::Camera, state: retrying });
-    assert_eq!(said(&bench.app), "Camera connection lost: the cable is out");
+    assert_eq!(reported(&bench.app), "Camera connection lost: the cable is out");
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn a_stop_without_connection_points_to_the_emergency_stop() {
     let mut bench = bench(&FakeCell::new(0));
     bench.app.absorb(connect::Event::Link { link: Link::Control, state: LinkState::StartingCell { why: None } });
     bench.app.apply(motion::Command::Stop);
-    assert!(said(&bench.app).contains("emergency stop"), "{}", said(&bench.app));
+    assert!(reported(&bench.app).contains("emergency stop"), "{}", reported(&bench.app));
     assert!(bench.app.model().stop_pending);
     bench.app.absorb(motion::Event::Stopped);
     assert!(bench.app.model().stop_pending, "nobody has said that it stands");
@@ -149,7 +149,7 @@ fn leaving_brakes_an_arm_that_it_moves_and_leaves_the_arm_of_others_alone() {
         let deadline = Instant::now() + Duration::from_mins(1);
         let until = |app: &mut App, is_so: &dyn Fn(&Model) -> bool| {
             while !is_so(app.model()) {
-                assert!(Instant::now() < deadline, "{}", said(app));
+                assert!(Instant::now() < deadline, "{}", reported(app));
                 app.collect();
                 std::thread::yield_now();
             }
@@ -198,7 +198,7 @@ fn commands_and_events_survive_being_written_down() {
         Command::Shell(shell::Command::SetTheme(ThemeChoice::Light)),
         Command::Session(session::Command::Delete(vec![CaptureId(3)])),
         Command::Taught(taught::Command::RunSequence { purpose: Some(CapturePurpose::Verify) }),
-        Command::Track(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom))),
+        Command::Track(track::Command::SetFollow(Some(FollowRequest::KeepViewWithRoom))),
         Command::Taught(taught::Command::VerifyAtPlanned),
     ];
     for command in commands {
@@ -356,7 +356,7 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     app.absorb(connect::Event::Robot(robot));
     app.apply(motion::Command::ConfirmMove);
     assert_eq!(app.model().motion, Motion::Idle);
-    assert!(said(app).contains("elsewhere"), "{}", said(app));
+    assert!(reported(app).contains("elsewhere"), "{}", reported(app));
     // Without confirmation the one that waits begins at once.
     choose(app);
     app.apply(motion::Command::SetConfirmMoves(false));
@@ -536,7 +536,7 @@ fn poses_to_verify_at_are_visited_once_they_are_planned_and_a_stop_meanwhile_lea
     assert!(bench.app.model().planning);
     bench.app.absorb(taught::Event::Planned { id, views: Err(Text::verbatim("the board is too far")) });
     assert!(!bench.app.model().planning && !bench.app.model().sequence_runs);
-    assert_eq!(said(&bench.app), "There are no poses to verify at: the board is too far");
+    assert_eq!(reported(&bench.app), "There are no poses to verify at: the board is too far");
 }
 
 #[test]
@@ -545,7 +545,7 @@ fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning()
     let mut model = sample::tracking();
     model.track.follow = FollowStatus::Off;
     bench.app.replace_model(model);
-    bench.app.apply(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    bench.app.apply(track::Command::SetFollow(Some(FollowRequest::KeepViewWithRoom)));
     let id = bench.app.cx.numbers.follow.expect("it follows");
     bench
         .app
@@ -554,7 +554,7 @@ fn why_following_ended_stands_in_its_pane_and_what_was_asked_for_is_no_warning()
     assert_eq!((newest.home, newest.severity), (Home::Pane(Pane::Track), crate::model::Severity::Warning));
     assert!(matches!(bench.app.model().track.follow, FollowStatus::Ended(_)));
 
-    bench.app.apply(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    bench.app.apply(track::Command::SetFollow(Some(FollowRequest::KeepViewWithRoom)));
     assert_eq!(bench.app.model().track.follow, FollowStatus::Off, "the reason before is no longer so");
     let id = bench.app.cx.numbers.follow.expect("it follows");
     bench.app.absorb(motion::Event::Moved { id, outcome: MotionOutcome::Stopped });

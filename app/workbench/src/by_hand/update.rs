@@ -128,11 +128,11 @@ fn view_chosen(model: &mut Model, numbers: &Numbers, number: u64, choice: HandCh
             hand.goes_on();
         }
         Some(HandNext::End(ending)) => {
-            let said = ending.text();
+            let reported = ending.text();
             hand.ending = Some(ending);
             hand.goes_on();
             if !model.solve.fresh {
-                guiding_ends(model, Severity::Warning, said);
+                guiding_ends(model, Severity::Warning, reported);
             }
         }
         None if hand.ending.is_some() => guiding_finished(model),
@@ -183,7 +183,7 @@ pub(crate) fn captured_by_hand(model: &mut Model, role: Option<Role>) {
     hand.goes_on();
 }
 
-/// The capture gave nothing: the same view is still wanted, or the first one anew.
+/// The capture gave nothing: the same view is still wanted, or the first one again.
 fn view_again(model: &mut Model) {
     let Some(hand) = model.by_hand.as_deref_mut() else { return };
     hand.rests = None;
@@ -191,23 +191,23 @@ fn view_again(model: &mut Model) {
         hand.waits = HandWaits::View;
         hand.refused_at = model.detection.as_ref().and_then(|detection| detection.base_from_tip);
     } else {
-        let said =
+        let reported =
             text!("The board was not captured: bring the whole board into the image, hold still and begin again");
-        guiding_ends(model, Severity::Warning, said);
+        guiding_ends(model, Severity::Warning, reported);
     }
 }
 
 fn guiding_finished(model: &mut Model) {
-    let said = model.by_hand.as_ref().and_then(|hand| Some(ended(hand.ending.as_ref()?, hand.checked)));
-    let Some((severity, said)) = said else { return };
-    guiding_ends(model, severity, said);
+    let reported = model.by_hand.as_ref().and_then(|hand| Some(ended(hand.ending.as_ref()?, hand.checked)));
+    let Some((severity, reported)) = reported else { return };
+    guiding_ends(model, severity, reported);
 }
 
 fn guiding_ends(model: &mut Model, severity: Severity, why: Text) {
     model.by_hand = None;
     match severity {
         Severity::Info => model.say(severity, why),
-        _ => model.say_in(Pane::Poses, severity, why),
+        _ => model.in_language_of(Pane::Poses, severity, why),
     }
 }
 

@@ -83,7 +83,7 @@ fn take_all<F: FnMut(u64) -> Result<RgbImage, &'static str>>(
 
 fn refused(end: Result<CaptureEnd, &'static str>) -> (RefusalKind, String) {
     match end.expect("images came") {
-        CaptureEnd::Refused(refused) => (refused.kind, refused.why.say(Language::English)),
+        CaptureEnd::Refused(refused) => (refused.kind, refused.why.in_language(Language::English)),
         CaptureEnd::Good(measured, _) => panic!("{measured:?}"),
     }
 }
@@ -143,9 +143,12 @@ fn images_without_a_pose_of_the_robot_end_the_capture_with_the_reason_that_its_d
     let sharp = board(0);
     let why = Text::verbatim("its states before and after the image are 0.400 s apart");
     let mut reel = Reel { no_pose: Some(why), ..Reel::new(|_| Ok(sharp.clone())) };
-    let (kind, said) = refused(take_all(request(1), &BOARD, &mut reel));
+    let (kind, reported) = refused(take_all(request(1), &BOARD, &mut reel));
     assert_eq!(kind, RefusalKind::NoImages);
-    assert!(said.contains("0.400 s apart") && !said.contains("pendant") && !said.contains("paused"), "{said}");
+    assert!(
+        reported.contains("0.400 s apart") && !reported.contains("pendant") && !reported.contains("paused"),
+        "{reported}"
+    );
 }
 
 #[test]

@@ -66,7 +66,7 @@ pub(crate) fn capture(
     }
 }
 
-/// Whether nothing can be captured into this session, which is said.
+/// Whether nothing can be captured into this session, which is reported.
 pub(crate) fn refuses_without_robot(model: &mut Model) -> bool {
     let refuses = model.document().mode().is_none();
     if refuses {
@@ -94,8 +94,8 @@ fn capture_refused(cx: &mut Context, number: u64, refused: CaptureRefused) {
         return;
     }
     cx.model.capture = None;
-    let said = text!("No capture: {why}", why = refused.why.clone());
-    cx.model.say_in(Pane::Colour, Severity::Warning, said);
+    let reported = text!("No capture: {why}", why = refused.why.clone());
+    cx.model.in_language_of(Pane::Colour, Severity::Warning, reported);
     sequence_refused(cx, &refused);
     cx.model.refused = Some(refused);
 }

@@ -174,17 +174,17 @@ pub fn of_part(part: Part) -> impl Iterator<Item = &'static Offered> {
 /// something else than there are fields for.
 pub fn parse(command: &str, part: Part) -> Option<(&'static Offered, Values)> {
     let Ok(DriverSpec::Command(words)) = command.parse() else { return None };
-    let [program, driver, name, told @ ..] = words.as_slice() else { return None };
+    let [program, driver, name, reported @ ..] = words.as_slice() else { return None };
     let offered = of_part(part).find(|offered| offered.name == name)?;
     if program != PROGRAM || driver != "driver" {
         return None;
     }
     let always = offered.always(part);
-    if !always.iter().all(|word| told.iter().any(|other| other == word)) {
+    if !always.iter().all(|word| reported.iter().any(|other| other == word)) {
         return None;
     }
     let mut values = Values::new();
-    let mut rest = told.iter().filter(|word| !always.contains(&word.as_str()));
+    let mut rest = reported.iter().filter(|word| !always.contains(&word.as_str()));
     while let Some(word) = rest.next() {
         let (option, value) = match word.split_once('=') {
             Some((option, value)) if word.starts_with("--") => (option, Some(value)),

@@ -65,7 +65,7 @@ fn start_simulation(model: &mut Model, workers: &Workers) {
     model.say_if_refused(text!("The simulation was not started"), asked);
 }
 
-/// Tries now what is being tried. A connection that works is made anew, because the scene may be another one.
+/// Tries now what is being tried. A connection that works is made again, because the scene may be another one.
 fn reconnect(cx: &mut Context, connector: &Connector) {
     if cx.model.control.is_connected() && !cx.model.source.is_built_in() {
         return connect(cx, connector, cx.model.source.clone());
@@ -127,7 +127,7 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
     cx.model.track.board_hidden = false;
     cx.model.trail = Trail::default();
     cx.model.scene_is_fitted = false;
-    cx.model.keep_out.standing = None;
+    cx.model.keep_out.scene_obstacles = None;
     cx.model.keep_out.unkept = None;
     send_target(&mut cx.model, &cx.workers);
     send_keep_out(&cx.model, &cx.workers);
@@ -202,8 +202,8 @@ fn link_changed(cx: &mut Context, link: Link, state: LinkState) {
                 Link::Camera => text!("Camera connection lost: {why}", why = why),
                 // Images and joints go on, so no card below the steps reports it.
                 Link::Motion => {
-                    let said = text!("Connection for motions lost: {why}", why = why);
-                    return cx.model.say(Severity::Warning, said);
+                    let reported = text!("Connection for motions lost: {why}", why = why);
+                    return cx.model.say(Severity::Warning, reported);
                 }
             };
             cx.model.say_of_connection(Severity::Warning, text);

@@ -73,12 +73,12 @@ fn written(model: &mut Model, written: Written) {
         Ok(files) => {
             model.export.is_present = true;
             let count = files.len();
-            let said = text!("{count} {count|file|files} written, read back and compared", count = count);
-            model.say_in(Pane::Export, Severity::Info, said);
+            let reported = text!("{count} {count|file|files} written, read back and compared", count = count);
+            model.in_language_of(Pane::Export, Severity::Info, reported);
         }
         Err(why) => {
-            let said = text!("Nothing was exported: {why}", why = why);
-            model.say_in(Pane::Export, Severity::Error, said);
+            let reported = text!("Nothing was exported: {why}", why = why);
+            model.in_language_of(Pane::Export, Severity::Error, reported);
         }
     }
     model.export.written = Some(written);

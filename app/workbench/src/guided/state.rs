@@ -152,13 +152,13 @@ pub(crate) fn options(goal_m: f64, views: usize) -> GuidedOptions {
 /// How it ended, after so many checks.
 pub(crate) fn ended(ending: &Ending, checked: usize) -> (Severity, Text) {
     if checked < CHECKS {
-        let said = text!(
+        let reported = text!(
             "{ending}. It was checked at {checked} of {of} poses only: see why in the log, and verify where you can",
             ending = ending.text(),
             checked = checked,
             of = CHECKS
         );
-        return (Severity::Warning, said);
+        return (Severity::Warning, reported);
     }
     (if ending.is_success() { Severity::Info } else { Severity::Warning }, ending.text())
 }

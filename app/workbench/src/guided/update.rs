@@ -212,8 +212,9 @@ fn guided_is_elsewhere(model: &mut Model) -> bool {
         return false;
     }
     guided.waits = Waits::Answer;
-    let said = text!("The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now");
-    model.say(Severity::Info, said);
+    let reported =
+        text!("The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now");
+    model.say(Severity::Info, reported);
     true
 }
 
@@ -296,7 +297,7 @@ fn choice_ended(cx: &mut Context, ending: Ending) {
         }
         return;
     }
-    let (has_answer, said) = (cx.model.solve.fresh, ending.text());
+    let (has_answer, reported) = (cx.model.solve.fresh, ending.text());
     let Some(sequence) = cx.model.sequence.as_mut() else { return };
     if let Some(guided) = sequence.guided.as_deref_mut() {
         guided.ending = Some(ending);
@@ -305,7 +306,7 @@ fn choice_ended(cx: &mut Context, ending: Ending) {
         guided.waits = Waits::Answer;
     }
     if !has_answer {
-        return guided_ends(&mut cx.model, &cx.desk, Severity::Warning, said);
+        return guided_ends(&mut cx.model, &cx.desk, Severity::Warning, reported);
     }
     sequence.purpose = Some(CapturePurpose::Verify);
     guided_step(&mut cx.model, &cx.workers, &mut cx.numbers);
@@ -321,12 +322,12 @@ pub(crate) fn guided_is_over(model: &mut Model, desk: &SessionThreads) -> bool {
 }
 
 fn guided_finished(model: &mut Model, desk: &SessionThreads) {
-    let Some((severity, said)) =
+    let Some((severity, reported)) =
         guided_mut(model).and_then(|guided| Some(ended(guided.ending.as_ref()?, guided.checked)))
     else {
         return;
     };
-    guided_ends(model, desk, severity, said);
+    guided_ends(model, desk, severity, reported);
 }
 
 /// A guided sequence is of one target and one set-up.
@@ -347,7 +348,7 @@ fn guided_ends(model: &mut Model, desk: &SessionThreads, severity: Severity, why
     model.asked = None;
     match severity {
         Severity::Info => model.say(severity, why),
-        _ => model.say_in(Pane::Poses, severity, why),
+        _ => model.in_language_of(Pane::Poses, severity, why),
     }
 }
 

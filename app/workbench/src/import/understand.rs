@@ -17,7 +17,7 @@ use handeye_wording::Value;
 use handeye_wording::text;
 
 /// Why nothing was made of a recording.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 pub enum NotUnderstood {
     /// The files, or the choices.
     #[error(transparent)]
@@ -85,7 +85,7 @@ impl Looked {
 }
 
 /// What is read: a line to a format.
-pub fn formats_said() -> Vec<Text> {
+pub fn formats_text() -> Vec<Text> {
     let line = |(name, endings): (Text, String)| {
         if endings.is_empty() { name } else { text!("{name} ({endings})", name = name, endings = endings) }
     };
@@ -93,7 +93,7 @@ pub fn formats_said() -> Vec<Text> {
 }
 
 /// That not everything was tried, and what to do.
-pub fn untried_said(judgement: &Judgement) -> Text {
+pub fn untried_text(judgement: &Judgement) -> Text {
     text!(
         "there are more hypotheses than are tried: {untried} of them and {series} pairs of series were left out. Name the series of \
          the robot (poses=NAME) and of the target (target_poses=NAME), or keep one recording in the folder",
@@ -102,7 +102,7 @@ pub fn untried_said(judgement: &Judgement) -> Text {
     )
 }
 
-/// Whether a setting says what to look at, and not only what it means: where it is made anew the images are looked at again.
+/// Whether a setting says what to look at, and not only what it means: where it is made again the images are looked at again.
 pub fn looks(key: &str, recording: &Recording) -> bool {
     // The offset of clocks is estimated for what a person has said of the poses.
     let is_about_clocks = matches!(key, "mode" | "pose" | "poses" | "clock_offset") && !recording.motions.is_empty();

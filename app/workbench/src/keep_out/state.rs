@@ -31,7 +31,7 @@ pub struct KeepOut {
     /// Since when \[s\] they are to be written.
     pub unwritten_since_s: Option<f64>,
     /// What the cell says stands around; `None` before it has said so.
-    pub standing: Option<Arc<Surroundings>>,
+    pub scene_obstacles: Option<Arc<Surroundings>>,
 }
 
 impl KeepOut {

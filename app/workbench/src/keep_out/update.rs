@@ -32,11 +32,11 @@ pub(crate) fn opened(file: Option<PathBuf>) -> (KeepOut, Option<Text>) {
             (KeepOut { file: Some(file), ..KeepOut::default() }, None)
         }
         Err(error) => {
-            let said = text!(
+            let reported = text!(
                 "The arm does not keep out of the boxes of this file. The file stays as it is, and the present boxes are not kept for the next start: {error}",
                 error = error
             );
-            (KeepOut { unsaved: Some(said.clone()), ..KeepOut::default() }, Some(said))
+            (KeepOut { unsaved: Some(reported.clone()), ..KeepOut::default() }, Some(reported))
         }
     }
 }
@@ -53,7 +53,7 @@ pub(crate) fn apply(model: &mut Model, workers: &Workers, desk: &SessionThreads,
 /// Takes in what stands around.
 pub(crate) fn absorb(model: &mut Model, workers: &Workers, event: Event) {
     match event {
-        Event::Standing(standing) => standing_found(model, standing),
+        Event::Standing(scene_obstacles) => surroundings_found(model, scene_obstacles),
         Event::Read(content) => keep_out_read(model, workers, *content),
     }
 }
@@ -69,20 +69,20 @@ pub(crate) fn send_keep_out(model: &Model, workers: &Workers) {
     workers.keep_out(Arc::clone(&model.keep_out.around));
 }
 
-/// Whether the arm keeps out of them, and of what else. That it does not is said once.
-fn standing_found(model: &mut Model, standing: Result<Arc<Surroundings>, Text>) {
+/// Whether the arm keeps out of them, and of what else. That it does not is reported once.
+fn surroundings_found(model: &mut Model, scene_obstacles: Result<Arc<Surroundings>, Text>) {
     let keep_out = &mut model.keep_out;
-    match standing {
-        Ok(standing) => {
-            keep_out.standing = Some(standing);
+    match scene_obstacles {
+        Ok(scene_obstacles) => {
+            keep_out.scene_obstacles = Some(scene_obstacles);
             keep_out.unkept = None;
         }
         Err(why) => {
-            let said = text!("The arm is not kept out of the boxes: {why}", why = why);
-            let is_news = keep_out.unkept.as_ref() != Some(&said) && !keep_out.content.boxes.is_empty();
-            keep_out.unkept = Some(said.clone());
+            let reported = text!("The arm is not kept out of the boxes: {why}", why = why);
+            let is_news = keep_out.unkept.as_ref() != Some(&reported) && !keep_out.content.boxes.is_empty();
+            keep_out.unkept = Some(reported.clone());
             if is_news {
-                model.say(Severity::Warning, said);
+                model.say(Severity::Warning, reported);
             }
         }
     }
@@ -138,25 +138,28 @@ mod tests {
     fn what_was_written_is_there_at_the_next_start_and_a_file_with_a_fault_is_left_alone() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("deep").join("keep_out.toml");
-        let (none, said) = opened(Some(file.clone()));
-        assert_eq!((none.content.boxes.len(), none.file.as_deref(), said), (0, Some(file.as_path()), None));
+        let (none, reported) = opened(Some(file.clone()));
+        assert_eq!((none.content.boxes.len(), none.file.as_deref(), reported), (0, Some(file.as_path()), None));
         let content = with_drawn(&none.content, [0.1, 0.1], [0.4, 0.3]).expect("a rectangle");
         write(&file, &content.to_toml()).expect("written");
-        let (again, said) = opened(Some(file.clone()));
-        assert_eq!((&again.content, again.around.obstacles.len(), said), (&content, 1, None));
+        let (again, reported) = opened(Some(file.clone()));
+        assert_eq!((&again.content, again.around.obstacles.len(), reported), (&content, 1, None));
 
         // One entry that makes no sense is shown, and takes no other one along.
         let mut faulty = again.content.clone();
         faulty.boxes.push(faulty.boxes[0].clone());
         faulty.boxes[1].size_m[0] = -1.0;
         write(&file, &faulty.to_toml()).expect("written");
-        let (with_fault, said) = opened(Some(file.clone()));
+        let (with_fault, reported) = opened(Some(file.clone()));
         assert_eq!((with_fault.content, with_fault.around.obstacles.len()), (faulty, 1));
-        assert!(said.is_some() && with_fault.file.is_some());
+        assert!(reported.is_some() && with_fault.file.is_some());
 
         std::fs::write(&file, "[[box]]\nname = \"post\"\n").expect("written");
-        let (broken, said) = opened(Some(file.clone()));
+        let (broken, reported) = opened(Some(file.clone()));
         assert!(broken.file.is_none() && broken.unsaved.is_some(), "nothing is written over it");
-        assert!(said.is_some_and(|said| said.say(crate::text::Language::English).contains("keep_out.toml")));
+        assert!(
+            reported
+                .is_some_and(|reported| reported.in_language(crate::text::Language::English).contains("keep_out.toml"))
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! What was said to the user, newest last.
+//! What was reported to the user, newest last.
 
 use std::collections::VecDeque;
 
@@ -24,10 +24,10 @@ pub enum Severity {
     Error,
 }
 
-/// Where a message stands. The log has all of them; besides that each stands in one place, so that nothing is said twice.
+/// Where a message stands. The log has all of them; besides that each stands in one place, so that nothing is reported twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Home {
-    /// The log alone: it is said for those who look for it.
+    /// The log alone: it is reported for those who look for it.
     Log,
     /// The line at the bottom: it went as asked.
     StatusLine,
@@ -62,7 +62,7 @@ pub struct Message {
     pub home: Home,
     /// When it happened, for the last time.
     pub at_s: f64,
-    /// How often it was said in a row.
+    /// How often it was reported in a row.
     pub times: u32,
     /// Whether the user has put it aside.
     pub dismissed: bool,
@@ -76,7 +76,7 @@ pub struct Messages {
 }
 
 impl Messages {
-    /// Says something where messages of its kind stand. The same words twice in a row are one message that was said
+    /// Says something where messages of its kind stand. The same words twice in a row are one message that was reported
     /// twice.
     pub fn say(&mut self, severity: Severity, text: Text, at_s: f64) {
         self.say_at(Home::of(severity), severity, text, at_s);
@@ -136,11 +136,11 @@ impl Messages {
 
 /// As it is, or the first part of it in English.
 fn shortened(text: Text) -> Text {
-    let said = text.say(Language::English);
-    if said.len() <= LONGEST {
+    let reported = text.in_language(Language::English);
+    if reported.len() <= LONGEST {
         return text;
     }
-    Text::verbatim(format!("{}…", &said[..said.floor_char_boundary(LONGEST)]))
+    Text::verbatim(format!("{}…", &reported[..reported.floor_char_boundary(LONGEST)]))
 }
 
 #[cfg(test)]
@@ -165,12 +165,12 @@ mod tests {
         messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, Text::verbatim("no way"), 1.0);
         messages.say(Severity::Error, Text::verbatim("elsewhere"), 2.0);
         messages.say(Severity::Info, Text::verbatim("done"), 3.0);
-        let said = |message: Option<&Message>| message.map(|message| message.number);
-        assert_eq!(said(messages.standing_in(Pane::Jog)), Some(0));
-        assert_eq!(said(messages.standing_in(Pane::Track)), None);
-        assert_eq!(said(messages.status_line()), Some(2));
+        let reported = |message: Option<&Message>| message.map(|message| message.number);
+        assert_eq!(reported(messages.standing_in(Pane::Jog)), Some(0));
+        assert_eq!(reported(messages.standing_in(Pane::Track)), None);
+        assert_eq!(reported(messages.status_line()), Some(2));
         messages.is_over_in(Pane::Jog);
-        assert_eq!(said(messages.standing_in(Pane::Jog)), None);
+        assert_eq!(reported(messages.standing_in(Pane::Jog)), None);
     }
 
     #[test]

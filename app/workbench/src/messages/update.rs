@@ -20,7 +20,7 @@ pub(crate) fn absorb(model: &mut Model, event: Event) {
 
 impl Model {
     /// Shows what a pane says for as long as it is so, and keeps it.
-    pub(crate) fn say_in(&mut self, pane: Pane, severity: Severity, text: Text) {
+    pub(crate) fn in_language_of(&mut self, pane: Pane, severity: Severity, text: Text) {
         self.messages.say_at(Home::Pane(pane), severity, text, self.now_s);
     }
 

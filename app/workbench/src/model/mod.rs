@@ -31,7 +31,7 @@ pub use crate::live::state::{
     exports_of,
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
-pub use crate::motion::state::{AskedMove, JogSettings, JogStep, Motion, MotionId, MotionRequest};
+pub use crate::motion::state::{JogSettings, JogStep, Motion, MotionId, MotionRequest, PendingMove};
 pub use crate::recording::state::{RerunState, ViewerState};
 pub use crate::session::state::{
     FolderEntry, FolderKind, FolderListing, Observed, PoseSequence, RecentSession, Review, SessionState, StopOutcome,
@@ -41,7 +41,7 @@ pub use crate::solve::estimated::{EstimatedValue, estimated};
 pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
 pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
 pub use crate::track::state::{
-    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
+    BoardMotion, FollowRequest, FollowStatus, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,
 };
 pub use crate::track::trail::{MAX_TRAIL_POINTS, Trail};
 pub use handeye_coppeliasim::cell::BoardPath;
@@ -275,7 +275,7 @@ pub struct Model {
     /// Whether a person has let the arm go since that sequence began or went on.
     pub let_go: bool,
     /// The move that waits until a person lets the arm go.
-    pub asked: Option<AskedMove>,
+    pub asked: Option<PendingMove>,
     /// Where the arm stood when the cell was connected.
     pub home: Option<JointValues>,
     /// Counts the cells that were connected to.
@@ -344,9 +344,10 @@ impl Model {
     }
 
     /// Values of all joints as a person reads them, each with its unit.
-    pub fn joints_said(&self, joints: &[f64]) -> String {
-        let said = |(i, &value): (usize, &f64)| format!("{:.1}", self.joint_kind(i).quantity(value)).replace('-', "−");
-        joints.iter().enumerate().map(said).collect::<Vec<_>>().join("  ")
+    pub fn joints_text(&self, joints: &[f64]) -> String {
+        let reported =
+            |(i, &value): (usize, &f64)| format!("{:.1}", self.joint_kind(i).quantity(value)).replace('-', "−");
+        joints.iter().enumerate().map(reported).collect::<Vec<_>>().join("  ")
     }
 
     /// Before anything has happened.

@@ -3,7 +3,7 @@
 
 use crate::app::Context;
 use crate::guided::update::{guided_chooses_anew, guided_skips};
-use crate::model::{AskedMove, Model, MotionGoal, Pane, Severity, StopOutcome};
+use crate::model::{Model, MotionGoal, Pane, PendingMove, Severity, StopOutcome};
 use crate::motion::update::start_motion;
 use crate::taught::sequence::end_stop;
 use crate::text::Text;
@@ -13,7 +13,7 @@ use handeye_wording::text;
 pub(crate) fn set_out(cx: &mut Context, goal: MotionGoal, what: Text) {
     if cx.model.asks_before(&goal) {
         cx.model.messages.is_over_in(Pane::Jog);
-        cx.model.asked = Some(AskedMove { goal, what });
+        cx.model.asked = Some(PendingMove { goal, what });
     } else {
         start_motion(cx, goal, what);
     }
@@ -22,14 +22,18 @@ pub(crate) fn set_out(cx: &mut Context, goal: MotionGoal, what: Text) {
 /// Whether somebody may send the arm somewhere now; a sequence would take the end of that motion for that of its own.
 pub(crate) fn may_set_out(model: &mut Model) -> bool {
     if model.sequence_runs {
-        model.say_in(Pane::Jog, Severity::Warning, text!("A sequence is under way: stop it to move the arm yourself"));
+        model.in_language_of(
+            Pane::Jog,
+            Severity::Warning,
+            text!("A sequence is under way: stop it to move the arm yourself"),
+        );
     }
     !model.sequence_runs
 }
 
 /// A person lets the arm go.
 pub(crate) fn confirm_move(cx: &mut Context) {
-    let Some(AskedMove { goal, what }) = cx.model.asked.take() else { return };
+    let Some(PendingMove { goal, what }) = cx.model.asked.take() else { return };
     if guided_chooses_anew(&mut cx.model) {
         return;
     }

@@ -12,7 +12,7 @@ use super::grip::{Grip, SILENCE};
 use super::jog_line::{Held, JogLine};
 use crate::connect::stop_line::StopLine;
 use crate::guided::state::GuideRequest;
-use crate::model::{FollowWish, MotionGoal, MotionId, MotionOutcome, MotionRequest};
+use crate::model::{FollowRequest, MotionGoal, MotionId, MotionOutcome, MotionRequest};
 use crate::text::Text;
 use crate::worker::Waker;
 use handeye_link::{JogRequest, ViewsRequest};
@@ -37,7 +37,7 @@ pub enum MotionTask {
         /// Its number.
         id: MotionId,
         /// What is wanted.
-        wish: FollowWish,
+        requested: FollowRequest,
         /// Share of the fastest speed at which it moves to where it has room.
         speed: f64,
     },
@@ -110,7 +110,7 @@ struct Inner {
     /// A button was held since the window last heard that the arm stands.
     owes_end: bool,
     /// What the window has to hear from here.
-    said: Vec<Event>,
+    reported: Vec<Event>,
     /// What a person keeps the arm out of.
     keep_out: Arc<Surroundings>,
     /// The same while the connection does not know of it.
@@ -215,8 +215,8 @@ impl MotionQueue {
     }
 
     /// Hands over what the window has not heard.
-    pub fn take_said(&self) -> Vec<Event> {
-        std::mem::take(&mut self.inner().said)
+    pub fn take_messages(&self) -> Vec<Event> {
+        std::mem::take(&mut self.inner().reported)
     }
 
     /// The worker has a connection.
@@ -326,7 +326,7 @@ impl Inner {
 
     fn say(&mut self, event: Event, waker: &Waker) {
         self.owes_end &= !matches!(event, Event::JogEnded { .. });
-        self.said.push(event);
+        self.reported.push(event);
         waker();
     }
 }

@@ -29,13 +29,15 @@ fn button(index: usize) -> JogRequest {
     JogRequest { jog: Jog::Joint { index, forward: true }, tip_from_camera: None, speed: 0.5 }
 }
 
-fn said(desk: &MotionQueue) -> Vec<(u64, String)> {
-    desk.take_said()
+fn reported(desk: &MotionQueue) -> Vec<(u64, String)> {
+    desk.take_messages()
         .into_iter()
         .map(|event| match event {
-            Event::Moved { id, outcome: MotionOutcome::Refused(why) } => (id.0, why.say(Language::English)),
+            Event::Moved { id, outcome: MotionOutcome::Refused(why) } => (id.0, why.in_language(Language::English)),
             Event::Moved { id, outcome } => (id.0, format!("{outcome:?}")),
-            Event::JogEnded { why } => (0, why.map_or_else(|| "released".to_owned(), |why| why.say(Language::English))),
+            Event::JogEnded { why } => {
+                (0, why.map_or_else(|| "released".to_owned(), |why| why.in_language(Language::English)))
+            }
             other => panic!("{other:?}"),
         })
         .collect()
@@ -50,16 +52,16 @@ fn what_comes_while_something_moves_is_refused_with_what_moves() {
     desk.ask(task(3), &free());
     desk.hold(button(0), &free(), 0.0);
     let reason = "a motion of the joints is still under way".to_owned();
-    assert_eq!(said(&desk), [(2, reason.clone()), (3, reason.clone()), (0, reason)]);
+    assert_eq!(reported(&desk), [(2, reason.clone()), (3, reason.clone()), (0, reason)]);
     desk.done();
     desk.hold(button(0), &free(), 0.1);
     assert!(matches!(desk.take(0.1), Work::Nothing), "the press that was refused does not begin later");
     desk.release();
-    assert_eq!(said(&desk), [(0, "released".to_owned())], "it was held after its end was told");
+    assert_eq!(reported(&desk), [(0, "released".to_owned())], "it was held after its end was told");
     desk.hold(button(0), &free(), 0.3);
     assert!(matches!(desk.take(0.3), Work::Jog(_)));
     desk.ask(task(4), &free());
-    assert_eq!(said(&desk), [(4, "The arm is being jogged".to_owned())]);
+    assert_eq!(reported(&desk), [(4, "The arm is being jogged".to_owned())]);
 }
 
 #[test]
@@ -67,17 +69,17 @@ fn a_stop_leaves_nothing_that_could_begin_later() {
     let desk = desk();
     desk.ask(task(1), &free());
     desk.cancel(0.0);
-    assert_eq!(said(&desk), [(1, "Stopped".to_owned())]);
+    assert_eq!(reported(&desk), [(1, "Stopped".to_owned())]);
     assert!(matches!(desk.take(0.0), Work::Nothing));
     desk.ask(task(2), &pressed());
     desk.hold(button(0), &pressed(), 0.0);
     let reason = "The arm is being stopped".to_owned();
-    assert_eq!(said(&desk), [(2, reason.clone()), (0, reason)]);
+    assert_eq!(reported(&desk), [(2, reason.clone()), (0, reason)]);
     assert!(matches!(desk.take(0.0), Work::Nothing));
     desk.release();
     desk.hold(button(0), &free(), 0.2);
     desk.cancel(0.2);
-    assert_eq!(said(&desk), [(0, "The arm was stopped".to_owned())]);
+    assert_eq!(reported(&desk), [(0, "The arm was stopped".to_owned())]);
     assert!(matches!(desk.take(0.2), Work::Nothing));
 }
 
@@ -89,7 +91,7 @@ fn a_stop_cancels_the_motion_under_way() {
     assert!(!cancel.is_cancelled());
     desk.cancel(0.0);
     assert!(cancel.is_cancelled());
-    assert!(said(&desk).is_empty(), "the worker tells when it stands");
+    assert!(reported(&desk).is_empty(), "the worker tells when it stands");
 }
 
 #[test]
@@ -100,15 +102,15 @@ fn a_jog_is_told_to_have_ended_once_and_with_its_reason() {
     desk.cancel(0.1);
     assert_eq!(desk.is_held(&button(0), 0.1), Held::Released);
     let Some(Event::JogEnded { why: Some(why) }) = desk.end_jog(&button(0), None, None, 0.2) else { panic!("no word") };
-    assert_eq!(why.say(Language::English), "The arm was stopped");
+    assert_eq!(why.in_language(Language::English), "The arm was stopped");
     desk.hold(button(0), &free(), 0.25);
     assert!(matches!(desk.take(0.25), Work::Nothing), "it has been held all the time");
 
     desk.release();
-    said(&desk);
+    reported(&desk);
     desk.hold(button(0), &free(), 0.4);
     desk.release();
-    assert_eq!(said(&desk), [(0, "released".to_owned())], "also when the worker was not quick enough to see it");
+    assert_eq!(reported(&desk), [(0, "released".to_owned())], "also when the worker was not quick enough to see it");
     desk.hold(button(1), &free(), 1.0);
     assert!(matches!(desk.take(1.0), Work::Jog(_)));
     desk.hold(button(2), &free(), 1.1);
@@ -126,7 +128,7 @@ fn a_connection_that_goes_takes_what_was_not_begun_with_it() {
     desk.disconnected(0.0);
     desk.ask(task(2), &free());
     let reason = "There is no connection that moves the arm".to_owned();
-    assert_eq!(said(&desk), [(1, reason.clone()), (2, reason)]);
+    assert_eq!(reported(&desk), [(1, reason.clone()), (2, reason)]);
     desk.connected();
     assert!(matches!(desk.take(0.0), Work::Nothing));
 }
@@ -159,7 +161,7 @@ fn every_motion_has_one_end_in_every_order_of_events() {
                 }
                 _ => {}
             }
-            for (id, _) in said(&desk) {
+            for (id, _) in reported(&desk) {
                 *ends.entry(id).or_default() += 1;
             }
         }
@@ -179,9 +181,9 @@ fn what_the_arm_keeps_out_of_is_told_once_for_each_change_and_each_connection() 
     assert!(queue.take_keep_out().is_none(), "there is nothing to keep out of and nobody to tell");
     let keep_out = Arc::new(Surroundings::default());
     queue.keep_out(Arc::clone(&keep_out));
-    assert!(queue.take_keep_out().is_some_and(|told| Arc::ptr_eq(&told, &keep_out)));
+    assert!(queue.take_keep_out().is_some_and(|stated| Arc::ptr_eq(&stated, &keep_out)));
     assert!(queue.take_keep_out().is_none());
     queue.disconnected(0.0);
     queue.connected();
-    assert!(queue.take_keep_out().is_some_and(|told| Arc::ptr_eq(&told, &keep_out)));
+    assert!(queue.take_keep_out().is_some_and(|stated| Arc::ptr_eq(&stated, &keep_out)));
 }

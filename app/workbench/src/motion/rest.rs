@@ -44,7 +44,7 @@ pub(crate) fn stop_waits(model: &mut Model) {
     if model.now_s - stopping.since_s < PATIENCE_S {
         return;
     }
-    let (severity, said) = match (stopping.watch.stands(), stopping.watch.moved()) {
+    let (severity, reported) = match (stopping.watch.is_still(), stopping.watch.moved()) {
         (Some(true), _) => (Severity::Info, text!("Arm stopped: every joint stays where it is")),
         (Some(false), Some(moved)) => (
             Severity::Error,
@@ -64,21 +64,21 @@ pub(crate) fn stop_waits(model: &mut Model) {
             ),
         ),
     };
-    stop_is_over(model, severity, said);
+    stop_is_over(model, severity, reported);
 }
 
-fn stop_is_over(model: &mut Model, severity: Severity, said: Text) {
+fn stop_is_over(model: &mut Model, severity: Severity, reported: Text) {
     model.stopping = None;
     model.stop_pending = false;
-    model.say(severity, said);
+    model.say(severity, reported);
 }
 
 pub(crate) fn stop(model: &mut Model, workers: &Workers) {
     workers.press_stop();
-    stop_asked(model, workers);
+    stop_requested(model, workers);
 }
 
-pub(crate) fn stop_asked(model: &mut Model, workers: &Workers) {
+pub(crate) fn stop_requested(model: &mut Model, workers: &Workers) {
     model.sequence_runs = false;
     model.asked = None;
     model.planning = false;

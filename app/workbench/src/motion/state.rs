@@ -22,7 +22,7 @@ pub struct MotionRequest {
 
 /// A move that waits until a person lets the arm go.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AskedMove {
+pub struct PendingMove {
     /// Where to.
     pub goal: MotionGoal,
     /// In words.

@@ -70,7 +70,7 @@ fn go_to_capture(cx: &mut Context, id: CaptureId) {
     let goal = joints.map(MotionGoal::Joints).or(capture.base_from_tip.map(MotionGoal::Tip));
     let Some(goal) = goal else {
         let why = text!("Capture {id} has no pose of the robot", id = id);
-        return cx.model.say_in(Pane::Jog, Severity::Warning, why);
+        return cx.model.in_language_of(Pane::Jog, Severity::Warning, why);
     };
     set_out(cx, goal, text!("pose of capture {id}", id = id));
 }
@@ -93,16 +93,16 @@ pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
     match &outcome {
         MotionOutcome::Arrived => {}
         MotionOutcome::Stopped => {
-            cx.model.say_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
+            cx.model.in_language_of(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
         }
         MotionOutcome::Refused(why) => {
             let why = why.clone();
-            let said = text!("The arm does not move to {what}: {why}", what = what, why = why);
-            cx.model.say_in(Pane::Jog, Severity::Warning, said);
+            let reported = text!("The arm does not move to {what}: {why}", what = what, why = why);
+            cx.model.in_language_of(Pane::Jog, Severity::Warning, reported);
         }
         MotionOutcome::Unreached(why) | MotionOutcome::Failed(why) | MotionOutcome::Held(why) => {
-            let said = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
-            cx.model.say_in(Pane::Jog, Severity::Error, said);
+            let reported = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
+            cx.model.in_language_of(Pane::Jog, Severity::Error, reported);
         }
     }
     // What an earlier motion still has to say does not move a sequence on.
@@ -129,13 +129,13 @@ fn press_jog(model: &mut Model, workers: &Workers, numbers: &mut Numbers, jog: J
                     let (what, since_s) = (text!("the next step"), model.now_s);
                     model.motion = Motion::Moving { id, what, since_s };
                 }
-                Err(busy) => model.say_in(Pane::Jog, Severity::Warning, busy.into()),
+                Err(busy) => model.in_language_of(Pane::Jog, Severity::Warning, busy.into()),
             }
         }
     }
 }
 
-/// The button is still held. A jog that has ended by itself does not begin anew before the next press.
+/// The button is still held. A jog that has ended by itself does not begin again before the next press.
 fn hold_jog(model: &mut Model, workers: &Workers, jog: Jog) {
     if model.jog_step() != JogStep::Hold {
         return;
@@ -148,7 +148,7 @@ fn jog_ended(model: &mut Model, why: Option<Text>) {
         model.motion = Motion::Idle;
     }
     if let Some(why) = why {
-        model.say_in(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
+        model.in_language_of(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
     }
 }
 
@@ -162,6 +162,6 @@ pub(crate) fn motion_lost(cx: &mut Context) {
 
 /// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
 fn camera_on_tip(model: &Model) -> Option<Pose<Tip, Camera>> {
-    let said = || Some(model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
-    model.tip_from_camera().or_else(said)
+    let reported = || Some(model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
+    model.tip_from_camera().or_else(reported)
 }

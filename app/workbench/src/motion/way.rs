@@ -51,7 +51,7 @@ impl Way {
     }
 
     /// For people.
-    pub fn said(&self, model: &Model) -> Text {
+    pub fn text(&self, model: &Model) -> Text {
         let mm = |metres: f64| format!("{:.0}", metres * 1e3);
         let deg = |radians: f64| format!("{:.1}", radians.to_degrees());
         let way = |joint: usize, way: f64| format!("{:.1}", model.joint_kind(joint).quantity(way));

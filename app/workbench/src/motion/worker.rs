@@ -11,7 +11,7 @@ use handeye_plan::guided::choose::Robot;
 use super::desk::{MotionQueue, MotionTask, Work};
 use super::jog_line::Held;
 use crate::guided::state::{Choice, GuideRequest};
-use crate::model::{FollowStatus, FollowWish, Link, MotionId, MotionOutcome, Severity};
+use crate::model::{FollowRequest, FollowStatus, Link, MotionId, MotionOutcome, Severity};
 use crate::text::Text;
 use crate::track::follow::follow;
 use crate::track::follow_line::FollowLine;
@@ -49,7 +49,7 @@ impl Motions {
         let outcome = match task {
             MotionTask::Move(request) => port.move_to(&request.goal, request.speed, cancel),
             MotionTask::JogStep { request, length, .. } => port.jog_step(request, *length, cancel),
-            MotionTask::Follow { wish, speed, .. } => self.follow(port, *wish, *speed, cancel, outlet),
+            MotionTask::Follow { requested, speed, .. } => self.follow(port, *requested, *speed, cancel, outlet),
             MotionTask::Guide { id, request } => return self.guide(port, *id, request, cancel, outlet),
             MotionTask::Plan { id, request } => return self.plan(port, *id, request, outlet),
         };
@@ -104,7 +104,7 @@ impl Motions {
     fn follow(
         &self,
         port: &mut dyn MotionPort,
-        wish: FollowWish,
+        requested: FollowRequest,
         speed: f64,
         cancel: &CancelToken,
         outlet: &Outlet,
@@ -118,7 +118,7 @@ impl Motions {
                 ),
             );
         };
-        let followed = follow(port, &self.line, wish, speed, cancel, &mut makes_room)?;
+        let followed = follow(port, &self.line, requested, speed, cancel, &mut makes_room)?;
         Ok(match (followed, self.line.take_ended()) {
             (Err(outcome), _) => outcome,
             (Ok(FollowEnd::Released | FollowEnd::Stopped), Some(why)) if !cancel.is_cancelled() => {

@@ -56,7 +56,7 @@ pub enum Entry {
     /// What the arm keeps clear of.
     KeepOut {
         /// What the cell says stands around.
-        standing: Arc<Surroundings>,
+        scene_obstacles: Arc<Surroundings>,
         /// What a person keeps the arm out of.
         own: Arc<Surroundings>,
     },
@@ -65,7 +65,7 @@ pub enum Entry {
     /// The step of the workflow, which decides what is shown.
     Step(Step),
     /// A line of the log.
-    Said {
+    Message {
         /// How much it matters.
         severity: Severity,
         /// The words, in English.

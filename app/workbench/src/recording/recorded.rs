@@ -17,5 +17,5 @@ pub(crate) struct Recorded {
     /// What the cell says stands around, and what a person keeps the arm out of.
     pub around: Option<[Arc<Surroundings>; 2]>,
     /// Messages with smaller numbers.
-    pub said: u64,
+    pub reported: u64,
 }

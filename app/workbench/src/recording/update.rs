@@ -71,7 +71,7 @@ pub(crate) fn note(recording: &dyn Recording, model: &Model, numbers: &Numbers, 
     recording.note(entry);
 }
 
-/// Notes what the user has changed, and what was said.
+/// Notes what the user has changed, and what was reported.
 pub(crate) fn note_changes(recording: &dyn Recording, model: &Model, recorded: &mut Recorded) {
     if recorded.step != Some(model.step) {
         recorded.step = Some(model.step);
@@ -87,15 +87,16 @@ pub(crate) fn note_changes(recording: &dyn Recording, model: &Model, recorded: &
         recorded.planned = model.planned_poses().iter().map(|planned| planned.base_from_tip).collect();
         recording.note(Entry::Planned(recorded.planned.clone()));
     }
-    let around = [model.keep_out.standing.clone().unwrap_or_default(), Arc::clone(&model.keep_out.around)];
+    let around = [model.keep_out.scene_obstacles.clone().unwrap_or_default(), Arc::clone(&model.keep_out.around)];
     if recorded.around.as_ref() != Some(&around) {
-        let [standing, own] = around.clone();
+        let [scene_obstacles, own] = around.clone();
         recorded.around = Some(around);
-        recording.note(Entry::KeepOut { standing, own });
+        recording.note(Entry::KeepOut { scene_obstacles, own });
     }
-    let unsaid: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.said).collect();
+    let unsaid: Vec<_> = model.messages.iter().rev().take_while(|it| it.number >= recorded.reported).collect();
     for message in unsaid.into_iter().rev() {
-        recorded.said = message.number + 1;
-        recording.note(Entry::Said { severity: message.severity, words: message.text.say(Language::English) });
+        recorded.reported = message.number + 1;
+        recording
+            .note(Entry::Message { severity: message.severity, words: message.text.in_language(Language::English) });
     }
 }

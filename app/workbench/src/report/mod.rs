@@ -5,7 +5,7 @@ mod page;
 
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::resolution::{angle_said, place_said};
+use handeye_estimate::resolution::{angle_text, place_text};
 use handeye_result::{CalibrationResult, EstimateDetails, MethodStatus, TransformEstimate, ViewRecordStatus};
 
 pub use markdown::markdown;
@@ -113,8 +113,8 @@ fn sigma_name(result: &CalibrationResult) -> &'static str {
 }
 
 fn findings(result: &CalibrationResult) -> Section {
-    let said = result.findings.iter().map(|found| format!("{} [{}]: {}", found.severity, found.code, found.text));
-    Section { lines: said.map(Line::Words).collect(), ..Section::default() }
+    let reported = result.findings.iter().map(|found| format!("{} [{}]: {}", found.severity, found.code, found.text));
+    Section { lines: reported.map(Line::Words).collect(), ..Section::default() }
 }
 
 fn transform(t: &TransformEstimate, sigma_name: &str) -> Section {
@@ -162,8 +162,8 @@ fn fit(result: &CalibrationResult) -> Section {
         q.heldout_rms_px.map(|rms| format!("{rms:.4} px on views held out")),
         q.sigma_px.map(|sigma| format!("corner noise {sigma:.4} px per axis")),
         robot.map(|(mm, deg)| {
-            let (place, angle) = (place_said(mm * 1e-3), angle_said(deg.to_radians()));
-            format!("robot noise {} and {} per axis", place.say(English), angle.say(English))
+            let (place, angle) = (place_text(mm * 1e-3), angle_text(deg.to_radians()));
+            format!("robot noise {} and {} per axis", place.in_language(English), angle.in_language(English))
         }),
     ]
     .into_iter()
@@ -257,12 +257,12 @@ fn methods(result: &CalibrationResult) -> Section {
         return Section::default();
     }
     let row = |m: &handeye_result::MethodRecord| {
-        let said = match (&m.status, m.translation_m.map(|t| t.map(|v| v * 1e3))) {
+        let reported = match (&m.status, m.translation_m.map(|t| t.map(|v| v * 1e3))) {
             (MethodStatus::Ok, Some([x, y, z])) => format!("[{x:9.3} {y:9.3} {z:9.3}] mm"),
             (MethodStatus::Failed(why), _) => why.clone(),
             (MethodStatus::Ok, None) => return None,
         };
-        Some(Line::row(&m.name, [said]))
+        Some(Line::row(&m.name, [reported]))
     };
     let title = "closed forms, for comparison".to_owned();
     Section { title, lines: result.methods.iter().filter_map(row).collect(), name_width: 12, ..Section::default() }
@@ -355,7 +355,7 @@ fn verification(solved: &Solved) -> Option<Section> {
 mod tests {
     use std::sync::Arc;
 
-    use handeye_result::WideningRecord;
+    use handeye_result::OverdispersionRecord;
 
     use super::*;
     use crate::testing::sample;
@@ -364,12 +364,12 @@ mod tests {
     fn a_widening_that_changes_no_figure_is_not_said() {
         let model = sample::solved();
         let mut solved = Arc::unwrap_or_clone(model.solve.current().expect("solved").clone());
-        let mut said = |factor| {
-            let widening = Some(WideningRecord { factor, by: "jackknife".to_owned(), lens_factor: None });
+        let mut reported = |factor| {
+            let widening = Some(OverdispersionRecord { factor, by: "jackknife".to_owned(), lens_factor: None });
             solved.result.estimate.as_mut().expect("a joint estimate").widening = widening;
             page(&solved)
         };
-        assert!(!said(1.01).contains("widened"));
-        assert!(said(1.1).contains("  stated uncertainty widened 1.10 times, by jackknife\n"));
+        assert!(!reported(1.01).contains("widened"));
+        assert!(reported(1.1).contains("  stated uncertainty widened 1.10 times, by jackknife\n"));
     }
 }

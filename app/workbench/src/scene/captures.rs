@@ -14,7 +14,7 @@ pub const BAD_AT_MEDIANS: f64 = 3.0;
 
 /// What a capture is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub enum CaptureUse {
     /// It enters the fit.
     Fit,
     /// It verifies it.
@@ -22,7 +22,7 @@ pub enum Standing {
     /// A person took it out.
     Excluded,
     /// It is meant to be in the fit, and the answer is without it.
-    Aside,
+    Rejected,
 }
 
 /// A capture as it is drawn.
@@ -31,7 +31,7 @@ pub struct CaptureItem {
     /// Where its camera was; `None` while nothing says where the camera sits.
     pub base_from_camera: Option<Pose<Base, Camera>>,
     /// What it is for.
-    pub standing: Standing,
+    pub used_as: CaptureUse,
     /// RMS of its residuals \[px\].
     pub rms_px: Option<f64>,
     /// The same, as a multiple of the median of those that are for the same.
@@ -95,18 +95,18 @@ impl<'a> Captures<'a> {
     /// One of them.
     pub fn item(&self, record: &CaptureRecord) -> CaptureItem {
         let outcome = self.known.solved.as_deref().and_then(|solved| outcome(solved, record.id));
-        let standing = match (record.excluded, record.role) {
-            (true, _) => Standing::Excluded,
-            (false, Role::Verification) => Standing::Verification,
-            (false, Role::Calibration) if outcome.is_some_and(|outcome| outcome.is_outlier) => Standing::Aside,
-            (false, Role::Calibration) => Standing::Fit,
+        let used_as = match (record.excluded, record.role) {
+            (true, _) => CaptureUse::Excluded,
+            (false, Role::Verification) => CaptureUse::Verification,
+            (false, Role::Calibration) if outcome.is_some_and(|outcome| outcome.is_outlier) => CaptureUse::Rejected,
+            (false, Role::Calibration) => CaptureUse::Fit,
         };
         let verifies = outcome.is_some_and(|outcome| outcome.verifies);
         let median_px = if verifies { self.verified_median_px } else { self.fit_median_px };
         let rms_px = outcome.and_then(|outcome| outcome.rms_px);
         CaptureItem {
             base_from_camera: record.base_from_tip.and_then(|tip| self.known.base_from_camera(&tip)),
-            standing,
+            used_as,
             rms_px,
             times_median: rms_px.zip(median_px).map(|(rms_px, median_px)| rms_px / median_px),
         }
@@ -128,12 +128,12 @@ mod tests {
         let known = Known::of(&model);
         let captures = Captures::new(&known);
         let record = |id: CaptureId| model.document().capture(id).expect("a capture").clone();
-        assert_eq!(captures.item(&record(sample::OUTLIER)).standing, Standing::Aside);
-        assert_eq!(captures.item(&record(CaptureId(1))).standing, Standing::Fit);
+        assert_eq!(captures.item(&record(sample::OUTLIER)).used_as, CaptureUse::Rejected);
+        assert_eq!(captures.item(&record(CaptureId(1))).used_as, CaptureUse::Fit);
         let verifying = captures.item(&record(CaptureId(sample::FITTED + 1)));
-        assert_eq!(verifying.standing, Standing::Verification);
+        assert_eq!(verifying.used_as, CaptureUse::Verification);
         let excluded = CaptureRecord { excluded: true, ..record(sample::OUTLIER) };
-        assert_eq!(captures.item(&excluded).standing, Standing::Excluded, "who took it out by hand knows");
+        assert_eq!(captures.item(&excluded).used_as, CaptureUse::Excluded, "who took it out by hand knows");
     }
 
     #[test]

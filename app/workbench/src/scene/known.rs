@@ -49,7 +49,7 @@ impl Truth {
     }
 }
 
-/// Everything that was said so far.
+/// Everything that was reported so far.
 #[derive(Debug, Default)]
 pub struct Known {
     /// Where the camera sits by the document; eye in hand before there is one.
@@ -118,7 +118,7 @@ impl Known {
         }
         let camera = self.truth()?.camera;
         let mode = if matches!(camera, Fixed::Tip(_)) { Mode::EyeInHand } else { Mode::EyeToHand };
-        (mode == self.mode()).then_some((Role::Said, camera))
+        (mode == self.mode()).then_some((Role::Reported, camera))
     }
 
     /// Where the camera is when the robot reports this pose, see [`Self::mount`].
@@ -166,8 +166,8 @@ impl Known {
 
     /// The board where it truly is.
     pub fn true_board(&self) -> Option<BoardItem> {
-        let said = || self.truth()?.board?.in_base(self.base_from_tip.as_ref());
-        Some(self.board_at(Role::True, Fixed::Base(self.base_from_target_true.or_else(said)?)))
+        let reported = || self.truth()?.board?.in_base(self.base_from_tip.as_ref());
+        Some(self.board_at(Role::True, Fixed::Base(self.base_from_target_true.or_else(reported)?)))
     }
 
     /// The board as it is tracked.
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn before_a_calibration_the_camera_is_where_the_cell_says_unless_the_session_has_it_elsewhere() {
         let known = Known::of(&sample::connected());
-        assert_eq!(known.camera().map(|camera| camera.role), Some(Role::Said));
+        assert_eq!(known.camera().map(|camera| camera.role), Some(Role::Reported));
         let beside = Known { document_mode: Some(Mode::EyeToHand), ..known };
         assert!(beside.camera().is_none());
         let calibrated = Known::of(&sample::solved());

@@ -11,7 +11,7 @@ mod known;
 pub(crate) mod update;
 
 pub use arm::{PosedArm, posed_arm};
-pub use captures::{BAD_AT_MEDIANS, CaptureItem, Captures, Standing, outcome};
+pub use captures::{BAD_AT_MEDIANS, CaptureItem, CaptureUse, Captures, outcome};
 pub use command::Command;
 pub use extent::{AZIMUTH_RAD, ELEVATION_RAD, Extent, OPENING_RAD};
 pub use known::{Known, Truth};
@@ -56,7 +56,7 @@ pub enum Role {
     /// By the calibration.
     Predictor,
     /// By what the cell says of itself, before there is a calibration.
-    Said,
+    Reported,
     /// By tracking.
     Tracked,
     /// By what a simulated cell says, to compare with.

@@ -224,23 +224,26 @@ fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
 
 #[cfg(test)]
 mod tests {
-    use handeye_estimate::uncertainty::widening::{Evidence, Widening};
+    use handeye_estimate::uncertainty::overdispersion::{Evidence, Overdispersion};
     use handeye_geometry::targets::bent::BoardShape;
 
     use super::*;
     use crate::testing::sample;
     use crate::text::Language;
 
-    fn said(change: impl FnOnce(&mut Calibration)) -> Vec<(String, String)> {
+    fn reported(change: impl FnOnce(&mut Calibration)) -> Vec<(String, String)> {
         let model = sample::solved();
         let mut calibration = model.solve.current().expect("solved").calibration.clone();
         let joint = calibration.joint.as_mut().expect("a joint estimate");
         (joint.shape, joint.joint_offsets) = (None, None);
-        joint.widening = Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() };
+        joint.widening = Overdispersion { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() };
         joint.noise.view_px = 0.0;
         change(&mut calibration);
         let lines = estimated(&calibration, None);
-        lines.iter().map(|it| (it.what.say(Language::English), it.value.say(Language::English))).collect()
+        lines
+            .iter()
+            .map(|it| (it.what.in_language(Language::English), it.value.in_language(Language::English)))
+            .collect()
     }
 
     fn has(lines: &[(String, String)], what: &str, value: &str) -> bool {
@@ -249,7 +252,7 @@ mod tests {
 
     #[test]
     fn nothing_is_said_of_what_is_as_usual() {
-        let lines = said(|_| ());
+        let lines = reported(|_| ());
         assert_eq!(lines.len(), 1, "{lines:?}");
         assert_eq!(lines[0].0, "Distribution of the stated error");
         assert!(lines[0].1.ends_with(" degrees of freedom"), "{lines:?}");
@@ -257,14 +260,14 @@ mod tests {
 
     #[test]
     fn a_widening_that_changes_no_figure_is_not_said() {
-        let widened = |times: f64| Widening {
+        let widened = |times: f64| Overdispersion {
             factor: times * times,
             by: Some(Evidence::Neighbours),
             lens: 1.0,
             checks: Vec::new(),
         };
         let is_said = |times| {
-            let lines = said(|calibration| calibration.joint.as_mut().expect("joint").widening = widened(times));
+            let lines = reported(|calibration| calibration.joint.as_mut().expect("joint").widening = widened(times));
             lines.iter().any(|(what, _)| what == "Uncertainty widened")
         };
         assert!(!is_said(1.01) && is_said(1.1));
@@ -272,7 +275,7 @@ mod tests {
 
     #[test]
     fn everything_is_said_with_its_unit() {
-        let lines = said(|c| {
+        let lines = reported(|c| {
             c.views[0].status = ViewStatus::Outlier;
             c.views[1].corners_aside = vec![3, 4];
             c.views[2].corners_aside = vec![5];
@@ -283,7 +286,8 @@ mod tests {
                 scale_sigma: Some(2e-4),
             });
             joint.noise.view_px = 0.12;
-            joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
+            joint.widening =
+                Overdispersion { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
             joint.small_sample.degrees_of_freedom = f64::INFINITY;
             joint.joint_offsets = Some(JointOffsets {
                 offsets_rad: vec![1.0_f64.to_radians(), (-0.5_f64).to_radians()],

@@ -1,4 +1,4 @@
-//! The observer: looks for the board in captures that were opened from the disk, or anew when the target is another.
+//! The observer: looks for the board in captures that were opened from the disk, or again when the target is another.
 
 use std::path::PathBuf;
 use std::sync::Arc;

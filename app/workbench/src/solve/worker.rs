@@ -49,13 +49,13 @@ pub struct SolveJob {
 pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
     let id = job.id;
     let began_s = outlet.now_s();
-    let told = Cell::new(None::<Progress>);
+    let stated = Cell::new(None::<Progress>);
     let progress = |now: Progress| {
-        let tell = told.get().is_none_or(|before| {
+        let tell = stated.get().is_none_or(|before| {
             before.stage != now.stage || (now.fraction() - before.fraction()).abs() >= PROGRESS_STEP
         });
         if tell {
-            told.set(Some(now));
+            stated.set(Some(now));
             outlet.report(solve::Event::Progress { job: id, stage: now.stage, part: now.fraction() });
         }
     };
@@ -73,7 +73,7 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
     outlet.report(solve::Event::Ended { job: id, outcome });
 }
 
-/// The calibration of a job with all that is said about it: one path for the window and the command line.
+/// The calibration of a job with all that is reported about it: one path for the window and the command line.
 ///
 /// # Errors
 /// [`CalibrateError`].
@@ -82,7 +82,7 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
     examined(job, fit, work)
 }
 
-/// All that is said about the calibration of a job.
+/// All that is reported about the calibration of a job.
 ///
 /// # Errors
 /// When the work was cancelled.
@@ -196,8 +196,9 @@ mod tests {
         let expected_mm = 2.0 + 0.01 * errors.at_mm;
         assert!((errors.offset_mm - expected_mm).abs() < 0.1, "{errors:?}");
         assert!((errors.scale.expect("captures") - 0.01).abs() < 1e-3, "{errors:?}");
-        let said = solved.findings.iter().find(|finding| finding.code == FindingCode::DepthError).expect("a finding");
-        assert!(said.to_string().contains("growing by +1.00"), "{said}");
+        let reported =
+            solved.findings.iter().find(|finding| finding.code == FindingCode::DepthError).expect("a finding");
+        assert!(reported.to_string().contains("growing by +1.00"), "{reported}");
         let json = solved.result.to_json().expect("a result");
         assert_eq!(CalibrationResult::from_json(&json).expect("readable").depth, solved.result.depth);
         cancel.cancel();

@@ -82,7 +82,7 @@ pub(crate) fn plan_verification(model: &mut Model, workers: &Workers, numbers: &
     });
     let Some(board) = board else {
         let why = text!("Poses to verify at are planned with a calibration of a camera on the tip only");
-        return model.say_in(Pane::Verify, Severity::Warning, why);
+        return model.in_language_of(Pane::Verify, Severity::Warning, why);
     };
     let taken = model.document().captures.iter().filter(|it| !it.excluded).filter_map(|it| it.base_from_tip).collect();
     numbers.motion = MotionId(numbers.motion.0 + 1);
@@ -114,8 +114,8 @@ pub(crate) fn planned(cx: &mut Context, id: MotionId, views: Result<Vec<JointVal
             },
         ),
         Err(why) => {
-            let said = text!("There are no poses to verify at: {why}", why = why);
-            cx.model.say_in(Pane::Verify, Severity::Warning, said);
+            let reported = text!("There are no poses to verify at: {why}", why = why);
+            cx.model.in_language_of(Pane::Verify, Severity::Warning, reported);
         }
     }
 }
@@ -124,8 +124,8 @@ pub(crate) fn planned(cx: &mut Context, id: MotionId, views: Result<Vec<JointVal
 pub(crate) fn plan_refused(model: &mut Model, outcome: &MotionOutcome) {
     model.planning = false;
     if let Some(why) = outcome.why() {
-        let said = text!("There are no poses to verify at: {why}", why = why.clone());
-        model.say_in(Pane::Verify, Severity::Warning, said);
+        let reported = text!("There are no poses to verify at: {why}", why = why.clone());
+        model.in_language_of(Pane::Verify, Severity::Warning, reported);
     }
 }
 
@@ -158,10 +158,11 @@ pub(crate) fn next_stop(cx: &mut Context) {
     cx.model.sequence_runs = false;
     let severity = if done == of { Severity::Info } else { Severity::Warning };
     let took = format!("{took_s:.0}");
-    let said = text!("Sequence ended: {done} of {of} {of|pose|poses} in {took} s", done = done, of = of, took = took);
+    let reported =
+        text!("Sequence ended: {done} of {of} {of|pose|poses} in {took} s", done = done, of = of, took = took);
     match severity {
-        Severity::Info => cx.model.say(severity, said),
-        _ => cx.model.say_in(pane, severity, said),
+        Severity::Info => cx.model.say(severity, reported),
+        _ => cx.model.in_language_of(pane, severity, reported),
     }
 }
 
@@ -226,11 +227,11 @@ pub(crate) fn break_off(model: &mut Model, why: Option<Text>) {
     model.sequence_runs = false;
     model.asked = None;
     let pane = model.sequence.as_ref().map_or(Pane::Taught, pane_of);
-    let said = match why {
+    let reported = match why {
         Some(why) => text!("The sequence was broken off, and what was captured is kept: {why}", why = why),
         None => text!("The sequence was broken off; what was captured is kept"),
     };
-    model.say_in(pane, Severity::Warning, said);
+    model.in_language_of(pane, Severity::Warning, reported);
 }
 
 /// Where it says how it went.

@@ -128,8 +128,8 @@ fn adopt_taught(model: &mut Model, desk: &SessionThreads) {
     let (fit, others): (Vec<&TaughtPose>, Vec<&TaughtPose>) = elsewhere.partition(fits);
     let (adopted, others) = (fit.into_iter().cloned().collect::<Vec<_>>(), others.len());
     if others > 0 {
-        let said = text!("{n} {n|pose has|poses have} another number of joints than this arm", n = others);
-        model.say(Severity::Warning, said);
+        let reported = text!("{n} {n|pose has|poses have} another number of joints than this arm", n = others);
+        model.say(Severity::Warning, reported);
     }
     if adopted.is_empty() {
         return;

@@ -24,7 +24,7 @@ use image::{Rgb, RgbImage};
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
-    BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, FollowStatus, FollowWish, FrameImages, FrameInfo,
+    BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, FollowRequest, FollowStatus, FrameImages, FrameInfo,
     JobId, LinkState, LiveDetection, LiveFrame, Model, Moves, Observed, PreviewFile, RobotState, SessionState,
     Simulation, Solved, TrackError, TrackPoint, TrackState, Tracked, Truth, ViewSettings,
 };
@@ -359,7 +359,7 @@ pub fn tracking() -> Model {
     let error = Some(TrackError { position_m: 0.31e-3, rotation_rad: 0.9e-3 });
     model.track = TrackState {
         on: true,
-        wish: Some(FollowWish::KeepView),
+        request: Some(FollowRequest::KeepView),
         follow: FollowStatus::Following { distance_m: 1.2e-3, angle_rad: 4e-3, is_kept_off: false },
         newest: Some(Arc::new(Tracked {
             frame: 1,

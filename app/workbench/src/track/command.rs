@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{BoardMotion, FollowStatus, FollowWish, Tracked};
+use crate::model::{BoardMotion, FollowRequest, FollowStatus, Tracked};
 use crate::text::Text;
 
 /// What the user wants of tracking and following the board.
@@ -15,7 +15,7 @@ pub enum Command {
     /// Track the board in every image, or no more.
     SetTracking(bool),
     /// Have the arm follow the board; `None` has it come to rest.
-    SetFollow(Option<FollowWish>),
+    SetFollow(Option<FollowRequest>),
     /// Have the simulated cell move its board.
     MoveBoard(BoardMotion),
     /// Hide the board of the simulated cell, or show it again.

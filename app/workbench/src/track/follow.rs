@@ -1,11 +1,11 @@
 //! An arm that goes along with the board.
 
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{FollowEnd, FollowMoment, FollowWish as ArmWish};
+use handeye_coppeliasim::cell::{FollowEnd, FollowMoment, FollowRequest as ArmRequest};
 use handeye_link::{MotionGoal, MotionOutcome, MotionPort, PortError, Room};
 
 use super::follow_line::FollowLine;
-use crate::model::FollowWish;
+use crate::model::FollowRequest;
 
 /// Has the arm do what is wished about the board that is tracked, from a place where it has room if that is wished, to which it
 /// moves at a share of its fastest speed; `makes_room` hears of that beforehand. Returns when the arm stands: how following ended,
@@ -16,22 +16,22 @@ use crate::model::FollowWish;
 pub fn follow(
     port: &mut dyn MotionPort,
     line: &FollowLine,
-    wish: FollowWish,
+    request: FollowRequest,
     speed: f64,
     cancel: &CancelToken,
     makes_room: &mut dyn FnMut(),
 ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
-    let board = line.board_in_view().filter(|_| wish == FollowWish::KeepViewWithRoom);
+    let board = line.board_in_view().filter(|_| request == FollowRequest::KeepViewWithRoom);
     match board.map(|board| port.room(&board)).transpose()? {
-        None | Some(Room::Enough) => line.begin(wish),
+        None | Some(Room::Enough) => line.begin(request),
         Some(Room::Nowhere(why)) => return Ok(Err(MotionOutcome::Refused(why))),
         Some(Room::At(joints)) => {
             makes_room();
             match port.move_to(&MotionGoal::Joints(joints), speed, cancel)? {
-                MotionOutcome::Arrived => line.begin_elsewhere(wish),
+                MotionOutcome::Arrived => line.begin_elsewhere(request),
                 outcome => return Ok(Err(outcome)),
             }
         }
     }
-    port.follow(&mut |moment: &FollowMoment| if cancel.is_cancelled() { ArmWish::End } else { line.wish(moment) })
+    port.follow(&mut |moment: &FollowMoment| if cancel.is_cancelled() { ArmRequest::End } else { line.request(moment) })
 }

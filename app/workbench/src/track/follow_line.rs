@@ -3,12 +3,12 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use handeye_coppeliasim::cell::{BoardInView, FollowGoal, FollowMoment, FollowWish as ArmWish};
+use handeye_coppeliasim::cell::{BoardInView, FollowGoal, FollowMoment, FollowRequest as ArmRequest};
 use handeye_estimate::handeye::HandEye;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_track::{Estimate, Keep, Rest, Setup, State, TipGoal, Update};
 
-use crate::model::{FollowStatus, FollowWish};
+use crate::model::{FollowRequest, FollowStatus};
 use crate::text::Text;
 use handeye_wording::text;
 
@@ -52,7 +52,7 @@ enum NoGoal {
 
 enum Aim {
     /// To be fixed at the first pass, from where the arm is by then.
-    Wished(FollowWish),
+    Wished(FollowRequest),
     Fixed(Keep),
 }
 
@@ -94,16 +94,16 @@ impl FollowLine {
     }
 
     /// What the arm is to do from its next pass on.
-    pub fn begin(&self, wish: FollowWish) {
+    pub fn begin(&self, request: FollowRequest) {
         let mut inner = self.inner();
-        inner.aim = Some(Aim::Wished(wish));
+        inner.aim = Some(Aim::Wished(request));
         (inner.patience_s, inner.waits_until_s, inner.without_goal_since_s) = (0.0, None, None);
         inner.ended = None;
     }
 
     /// The same after the arm was moved, when the board may have to be found again.
-    pub fn begin_elsewhere(&self, wish: FollowWish) {
-        self.begin(wish);
+    pub fn begin_elsewhere(&self, request: FollowRequest) {
+        self.begin(request);
         self.inner().patience_s = PATIENCE_S;
     }
 
@@ -118,16 +118,16 @@ impl FollowLine {
     }
 
     /// What the arm is to do in a pass.
-    pub fn wish(&self, moment: &FollowMoment) -> ArmWish {
+    pub fn request(&self, moment: &FollowMoment) -> ArmRequest {
         let mut inner = self.inner();
         if inner.waits(moment) {
-            return ArmWish::Rest;
+            return ArmRequest::Rest;
         }
         match inner.goal(moment) {
             Ok(goal) => {
                 inner.without_goal_since_s = None;
                 inner.status = Some(following(&goal.base_from_tip, moment));
-                ArmWish::Towards(FollowGoal {
+                ArmRequest::Towards(FollowGoal {
                     base_from_tip: goal.base_from_tip,
                     velocity_m_s: goal.velocity_m_s,
                     angular_velocity_rad_s: goal.angular_velocity_rad_s,
@@ -135,11 +135,11 @@ impl FollowLine {
             }
             Err(NoGoal::Now(_)) if inner.has_patience(moment) => {
                 inner.status = Some(FollowStatus::Waiting);
-                ArmWish::Rest
+                ArmRequest::Rest
             }
             Err(NoGoal::Now(why) | NoGoal::Ever(why)) => {
                 inner.ended.get_or_insert(why);
-                ArmWish::End
+                ArmRequest::End
             }
         }
     }
@@ -175,13 +175,13 @@ impl Inner {
                  images are taken and has to keep real time",
                 age = format!("{ahead_s:.1}")
             );
-            // The clock of a simulation that is started anew goes back.
+            // The clock of a simulation that is started again goes back.
             return Err(if ahead_s > 0.0 { NoGoal::Now(why) } else { NoGoal::Ever(why) });
         }
         let now = self.rest.at().unwrap_or(estimate).carried_to(moment.sim_time_s);
         let keep = match self.aim.take() {
             Some(Aim::Fixed(keep)) => keep,
-            Some(Aim::Wished(wish)) => fixed(wish, &now, setup, &moment.base_from_tip),
+            Some(Aim::Wished(request)) => fixed(request, &now, setup, &moment.base_from_tip),
             None => return Err(ever(text!("The arm was not asked to follow"))),
         };
         let goal = keep.tip_goal(&now, &setup.calibrated, &setup.target);
@@ -190,14 +190,14 @@ impl Inner {
     }
 }
 
-fn fixed(wish: FollowWish, now: &Estimate, setup: &Setup, base_from_tip: &Pose<Base, Tip>) -> Keep {
-    match wish {
-        FollowWish::KeepView | FollowWish::KeepViewWithRoom => {
+fn fixed(request: FollowRequest, now: &Estimate, setup: &Setup, base_from_tip: &Pose<Base, Tip>) -> Keep {
+    match request {
+        FollowRequest::KeepView | FollowRequest::KeepViewWithRoom => {
             let base_from_camera = setup.calibrated.base_from_camera(base_from_tip);
             Keep::View(base_from_camera.inverse() * now.base_from_target)
         }
-        FollowWish::KeepPose(camera_from_target) => Keep::View(camera_from_target),
-        FollowWish::Corner { index, stand_off_m } => {
+        FollowRequest::KeepPose(camera_from_target) => Keep::View(camera_from_target),
+        FollowRequest::Corner { index, stand_off_m } => {
             Keep::Corner { index, stand_off_m, base_from_tip_orientation: base_from_tip.rotation() }
         }
     }

@@ -26,10 +26,10 @@ fn an_arm_that_was_moved_waits_for_the_board_and_then_keeps_the_view_that_it_has
     let (line, seen, tip) = line();
     let lost = Update { state: State::Lost { since_s: 29.0 }, estimate: None, seen: None, ..seen.clone() };
     line.see(&lost);
-    line.begin_elsewhere(FollowWish::KeepViewWithRoom);
-    assert_eq!(line.wish(&moment(30.0, tip)), ArmWish::Rest);
+    line.begin_elsewhere(FollowRequest::KeepViewWithRoom);
+    assert_eq!(line.request(&moment(30.0, tip)), ArmRequest::Rest);
     line.see(&seen);
-    let ArmWish::Towards(goal) = line.wish(&moment(30.05, tip)) else { panic!("it follows") };
+    let ArmRequest::Towards(goal) = line.request(&moment(30.05, tip)) else { panic!("it follows") };
     // The board is at 6 mm/s: after two passes the goal is still where the tip is.
     assert!(goal.base_from_tip.distance_to(&tip).0 < 1e-3);
 }
@@ -39,18 +39,18 @@ fn an_arm_that_loses_the_board_stands_and_goes_on_when_it_is_seen_again_in_time(
     let (line, seen, tip) = line();
     let lost = Update { state: State::Lost { since_s: 29.0 }, estimate: None, seen: None, ..seen.clone() };
     line.see(&seen);
-    line.begin(FollowWish::KeepView);
-    let is_followed = |at_s: f64| matches!(line.wish(&moment(at_s, tip)), ArmWish::Towards(_));
+    line.begin(FollowRequest::KeepView);
+    let is_followed = |at_s: f64| matches!(line.request(&moment(at_s, tip)), ArmRequest::Towards(_));
     assert!(is_followed(30.05));
     line.see(&lost);
-    assert_eq!(line.wish(&moment(30.1, tip)), ArmWish::Rest);
+    assert_eq!(line.request(&moment(30.1, tip)), ArmRequest::Rest);
     assert_eq!(line.take_status(), Some(FollowStatus::Waiting));
     line.see(&seen);
     assert!(is_followed(30.2));
     // The images stop: the newest one grows old.
-    assert_eq!(line.wish(&moment(30.2 + LONGEST_GUESS_S, tip)), ArmWish::Rest);
-    assert_eq!(line.wish(&moment(30.1 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::Rest);
-    assert_eq!(line.wish(&moment(30.3 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmWish::End);
+    assert_eq!(line.request(&moment(30.2 + LONGEST_GUESS_S, tip)), ArmRequest::Rest);
+    assert_eq!(line.request(&moment(30.1 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmRequest::Rest);
+    assert_eq!(line.request(&moment(30.3 + LONGEST_GUESS_S + PATIENCE_S, tip)), ArmRequest::End);
     assert!(line.take_ended().is_some());
 }
 
@@ -59,10 +59,10 @@ fn an_arm_that_waits_in_vain_ends_and_one_that_was_not_moved_does_not_wait() {
     let (line, seen, tip) = line();
     let lost = Update { state: State::Searching, estimate: None, seen: None, ..seen };
     line.see(&lost);
-    line.begin_elsewhere(FollowWish::KeepView);
-    assert_eq!(line.wish(&moment(30.0, tip)), ArmWish::Rest);
-    assert_eq!(line.wish(&moment(30.0 + PATIENCE_S - 0.01, tip)), ArmWish::Rest);
-    assert_eq!(line.wish(&moment(30.0 + PATIENCE_S, tip)), ArmWish::End);
-    line.begin(FollowWish::KeepView);
-    assert_eq!(line.wish(&moment(40.0, tip)), ArmWish::End);
+    line.begin_elsewhere(FollowRequest::KeepView);
+    assert_eq!(line.request(&moment(30.0, tip)), ArmRequest::Rest);
+    assert_eq!(line.request(&moment(30.0 + PATIENCE_S - 0.01, tip)), ArmRequest::Rest);
+    assert_eq!(line.request(&moment(30.0 + PATIENCE_S, tip)), ArmRequest::End);
+    line.begin(FollowRequest::KeepView);
+    assert_eq!(line.request(&moment(40.0, tip)), ArmRequest::End);
 }

@@ -56,7 +56,7 @@ pub struct TrackPoint {
 
 /// What the arm is to do about the board.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum FollowWish {
+pub enum FollowRequest {
     /// Keep the camera where it is relative to the board now.
     KeepView,
     /// The same; where the arm has no room to go along with the board from there, from the nearest place where it has.
@@ -101,7 +101,7 @@ pub struct TrackState {
     /// Whether images are tracked.
     pub on: bool,
     /// What the arm was asked for.
-    pub wish: Option<FollowWish>,
+    pub request: Option<FollowRequest>,
     /// What the arm does.
     pub follow: FollowStatus,
     /// The newest image.

@@ -7,7 +7,7 @@ use handeye_track::{MotionModel, Setup};
 use super::command::{Command, Event};
 use crate::app::Numbers;
 use crate::model::{
-    BoardMotion, FollowStatus, FollowWish, MAX_TRACK_POINTS, Model, Motion, MotionId, MotionOutcome, Pane, Severity,
+    BoardMotion, FollowRequest, FollowStatus, MAX_TRACK_POINTS, Model, Motion, MotionId, MotionOutcome, Pane, Severity,
     TrackPoint, Tracked,
 };
 use crate::text::Text;
@@ -21,7 +21,7 @@ const RADIUS_95: f64 = 2.795_483_482_915_108;
 pub(crate) fn apply(model: &mut Model, workers: &Workers, numbers: &mut Numbers, command: Command) {
     match command {
         Command::SetTracking(on) => set_tracking(model, workers, numbers, on),
-        Command::SetFollow(wish) => set_follow(model, workers, numbers, wish),
+        Command::SetFollow(request) => set_follow(model, workers, numbers, request),
         Command::MoveBoard(motion) => move_board(model, workers, motion),
         Command::HideBoard(hidden) => hide_board(model, workers, hidden),
     }
@@ -94,9 +94,9 @@ fn track_failed(model: &mut Model, workers: &Workers, numbers: &mut Numbers, why
     set_tracking(model, workers, numbers, false);
 }
 
-fn set_follow(model: &mut Model, workers: &Workers, numbers: &mut Numbers, wish: Option<FollowWish>) {
-    model.track.wish = wish;
-    let Some(wish) = wish else {
+fn set_follow(model: &mut Model, workers: &Workers, numbers: &mut Numbers, request: Option<FollowRequest>) {
+    model.track.request = request;
+    let Some(request) = request else {
         if numbers.follow.is_some() {
             workers.cancel_motion();
         }
@@ -108,7 +108,7 @@ fn set_follow(model: &mut Model, workers: &Workers, numbers: &mut Numbers, wish:
     }
     numbers.motion = MotionId(numbers.motion.0 + 1);
     let id = numbers.motion;
-    match workers.follow(id, wish, model.speed()) {
+    match workers.follow(id, request, model.speed()) {
         Ok(()) => {
             numbers.follow = Some(id);
             model.track.follow = FollowStatus::Off;
@@ -129,7 +129,7 @@ fn follow_goes(model: &mut Model, numbers: &Numbers, status: FollowStatus) {
 
 pub(crate) fn follow_ended(model: &mut Model, numbers: &mut Numbers, outcome: MotionOutcome) {
     numbers.follow = None;
-    model.track.wish = None;
+    model.track.request = None;
     let (severity, why) = match outcome {
         MotionOutcome::Arrived | MotionOutcome::Stopped => (Severity::Info, text!("it was stopped")),
         MotionOutcome::Refused(why)
@@ -137,10 +137,10 @@ pub(crate) fn follow_ended(model: &mut Model, numbers: &mut Numbers, outcome: Mo
         | MotionOutcome::Failed(why)
         | MotionOutcome::Held(why) => (Severity::Warning, why),
     };
-    let said = text!("The arm does not follow the board: {why}", why = why.clone());
+    let reported = text!("The arm does not follow the board: {why}", why = why.clone());
     match severity {
-        Severity::Info => model.say(severity, said),
-        _ => model.say_in(Pane::Track, severity, said),
+        Severity::Info => model.say(severity, reported),
+        _ => model.in_language_of(Pane::Track, severity, reported),
     }
     model.track.follow = FollowStatus::Ended(why);
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use handeye_arm::{ArmKind, JointKind, JointValues};
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{self, ArmKinematics, BoardInView, FollowEnd, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{self, ArmKinematics, BoardInView, FollowEnd, FollowMoment, FollowRequest};
 use handeye_driver::LogLevel;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::depth::DepthImage;
@@ -314,12 +314,12 @@ impl MotionPort for FakeCell {
 
     fn follow(
         &mut self,
-        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+        requested: &mut dyn FnMut(&FollowMoment) -> FollowRequest,
     ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
         let RobotState { base_from_tip, joints_rad, .. } = self.state()?.expect("it has one");
         let sim_time_s = || self.script().frames as f64 * 0.05;
         let moment = |sim_time_s| FollowMoment { sim_time_s, joints: joints_rad, base_from_tip, is_kept_off: false };
-        let outcome = self.end_of_motion(|_| {}, || wish(&moment(sim_time_s())) != FollowWish::End)?;
+        let outcome = self.end_of_motion(|_| {}, || requested(&moment(sim_time_s())) != FollowRequest::End)?;
         Ok(if outcome == MotionOutcome::Stopped { Ok(FollowEnd::Released) } else { Err(outcome) })
     }
 }

@@ -61,7 +61,7 @@ pub enum FileTask {
         file: PathBuf,
         /// What.
         text: String,
-        /// Whether a person waits for it to be said.
+        /// Whether a person waits for it to be reported.
         is_wished: bool,
     },
     /// Write a board for a printer.
@@ -120,8 +120,8 @@ pub fn perform(task: FileTask, outlet: &Outlet) {
             }
         }
         FileTask::PrintTarget { target, page, file } => {
-            let (severity, said) = crate::target::print::write(&target, page, &file);
-            outlet.notice(severity, said);
+            let (severity, message) = crate::target::print::write(&target, page, &file);
+            outlet.notice(severity, message);
         }
         FileTask::ReadKeepOut(file) => {
             match KeepOutFile::read(&file).and_then(|content| content.surroundings(&file).map(|_around| content)) {
@@ -181,15 +181,15 @@ fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<
 /// Has a program show a folder, until the program ends; says where the folder is when there is none.
 fn open_folder(folder: PathBuf, show: impl FnOnce(&Path) -> io::Result<()> + Send + 'static, outlet: &Outlet) {
     if !folder.is_dir() {
-        let said = text!("{folder} is not there yet: it is made with the first capture", folder = folder.display());
-        return outlet.notice(Severity::Warning, said);
+        let message = text!("{folder} is not there yet: it is made with the first capture", folder = folder.display());
+        return outlet.notice(Severity::Warning, message);
     }
     // The program may stay as long as its window.
     let outlet = outlet.clone();
     let waited = Builder::new().name("file manager".to_owned()).spawn(move || {
         if let Err(error) = show(&folder) {
-            let said = text!("No program shows the folder {folder}: {why}", folder = folder.display(), why = error);
-            outlet.notice(Severity::Warning, said);
+            let message = text!("No program shows the folder {folder}: {why}", folder = folder.display(), why = error);
+            outlet.notice(Severity::Warning, message);
         }
     });
     tracing::debug!(?waited, "a folder is shown");
@@ -257,15 +257,15 @@ mod tests {
     use crate::command::Event;
     use crate::text::Language;
 
-    /// What is said until nobody is left who could say something.
-    fn said(folder: &Path, is_shown: bool) -> Vec<String> {
+    /// What is reported until nobody is left who could say something.
+    fn message(folder: &Path, is_shown: bool) -> Vec<String> {
         let show = move |_: &Path| if is_shown { Ok(()) } else { Err(io::Error::other("no program")) };
         let (events, reported) = crossbeam_channel::bounded(4);
         let outlet = Outlet { events, waker: Arc::new(|| {}), clock: Arc::new(|| 0.0) };
         open_folder(folder.to_path_buf(), show, &outlet);
         drop(outlet);
         let notices = reported.iter().map(|event| match event {
-            Event::Messages(messages::Event::Notice { text, .. }) => text.say(Language::English),
+            Event::Messages(messages::Event::Notice { text, .. }) => text.in_language(Language::English),
             other => panic!("{other:?}"),
         });
         notices.collect()
@@ -284,9 +284,9 @@ mod tests {
     fn a_folder_that_nothing_can_show_is_named() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().display().to_string();
-        assert_eq!(said(folder.path(), false), [format!("No program shows the folder {path}: no program")]);
-        let words = said(&folder.path().join("later"), false);
+        assert_eq!(message(folder.path(), false), [format!("No program shows the folder {path}: no program")]);
+        let words = message(&folder.path().join("later"), false);
         assert_eq!(words, [format!("{path}/later is not there yet: it is made with the first capture")]);
-        assert!(said(folder.path(), true).is_empty());
+        assert!(message(folder.path(), true).is_empty());
     }
 }

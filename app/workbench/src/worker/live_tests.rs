@@ -127,13 +127,13 @@ fn what_is_out_of_reach_is_refused_with_the_reason_and_nothing_moves() {
     far = Pose::from_isometry(nalgebra::Translation3::new(2.0, 0.0, 0.0) * far.isometry());
     live.bench.move_to(1, MotionGoal::Tip(far), 1.0);
     let MotionOutcome::Refused(why) = live.bench.moved(1) else { panic!("it was not refused") };
-    let why = why.say(Language::English);
+    let why = why.in_language(Language::English);
     assert!(why.contains("cannot go there") && why.contains("closer to the robot"), "{why}");
     let mut turned = before;
     turned[2] = 7.0;
     live.bench.move_to(2, MotionGoal::Joints(turned), 1.0);
     let MotionOutcome::Refused(why) = live.bench.moved(2) else { panic!("it was not refused") };
-    assert!(why.say(Language::English).contains("Joint 3"), "{why:?}");
+    assert!(why.in_language(Language::English).contains("Joint 3"), "{why:?}");
     live.bench.move_to(3, MotionGoal::Joints(before), 1.5);
     assert!(matches!(live.bench.moved(3), MotionOutcome::Refused(_)), "150 % is no speed");
     assert_eq!(live.joints(), before);
@@ -147,7 +147,7 @@ fn nothing_moves_while_the_simulation_rests_and_the_reason_is_told() {
     live.bench.move_to(1, MotionGoal::Joints([0.0; 6].into()), 1.0);
     // No other pose would go better: a sequence ends with it.
     let MotionOutcome::Failed(why) = live.bench.moved(1) else { panic!("it did not fail") };
-    assert!(why.say(Language::English).contains("stopped"), "{why:?}");
+    assert!(why.in_language(Language::English).contains("stopped"), "{why:?}");
     live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 0.5, None);
     assert!(live.bench.jog_ended().expect("a reason").contains("stopped"));
 }
@@ -189,7 +189,7 @@ fn the_arm_does_not_go_into_a_box_that_a_person_keeps_it_out_of() {
     live.bench.workers.keep_out(Arc::new(Surroundings::of(vec![post])));
     live.bench.move_to(1, MotionGoal::Joints(goal), 0.5);
     let MotionOutcome::Refused(why) = live.bench.moved(1) else { panic!("it goes into the post") };
-    assert!(why.say(Language::English).contains("post"), "{}", why.say(Language::English));
+    assert!(why.in_language(Language::English).contains("post"), "{}", why.in_language(Language::English));
     assert_eq!(live.joints(), start);
     live.bench.workers.keep_out(Arc::default());
     live.bench.move_to(3, MotionGoal::Joints(goal), 1.0);
@@ -280,7 +280,7 @@ fn a_step_goes_exactly_as_far_as_it_was_asked_to() {
     let jog = Jog::Rotate { frame: JogFrame::Camera, axis: Axis::X, forward: true };
     live.bench.workers.jog_step(MotionId(2), jog, 0.1, 0.25, None).expect("the worker is there");
     let MotionOutcome::Refused(why) = live.bench.moved(2) else { panic!("nobody knows the camera") };
-    assert!(why.say(Language::English).contains("calibrate first"), "{why:?}");
+    assert!(why.in_language(Language::English).contains("calibrate first"), "{why:?}");
 }
 
 #[test]

@@ -62,7 +62,8 @@ use crate::connect::worker::Control;
 use crate::guided::state::GuideRequest;
 use crate::live::worker::Camera;
 use crate::model::{
-    CellSource, FollowWish, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked, ViewSettings,
+    CellSource, FollowRequest, Jog, LiveDetection, LiveFrame, MotionId, MotionRequest, RobotState, Tracked,
+    ViewSettings,
 };
 use crate::motion::worker::Motions;
 use crate::{connect, live, track};
@@ -199,7 +200,7 @@ impl Workers {
         for events in self.events.iter().flatten() {
             events.try_iter().take(MAX_EVENTS).for_each(&mut absorb);
         }
-        self.desk.take_said().into_iter().map(Event::from).for_each(&mut absorb);
+        self.desk.take_messages().into_iter().map(Event::from).for_each(&mut absorb);
         if let Some((robot, _)) = self.robot.take() {
             absorb(robot.map_or(connect::Event::NoRobot, connect::Event::Robot).into());
         }
@@ -265,8 +266,8 @@ impl Workers {
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    pub fn follow(&self, id: MotionId, wish: FollowWish, speed: f64) -> Result<(), Busy> {
-        self.begin(MotionTask::Follow { id, wish, speed })
+    pub fn follow(&self, id: MotionId, requested: FollowRequest, speed: f64) -> Result<(), Busy> {
+        self.begin(MotionTask::Follow { id, requested, speed })
     }
 
     /// Asks for poses to look at the board from. [`Planned`](crate::taught::Event::Planned) tells them;

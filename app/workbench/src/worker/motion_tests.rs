@@ -8,7 +8,7 @@ use crossbeam_channel::Receiver;
 
 use super::fake::{FakeCell, FakeMotions};
 use super::*;
-use crate::model::{CellFacts, FollowStatus, FollowWish, Link, LinkState, MotionGoal, MotionOutcome};
+use crate::model::{CellFacts, FollowRequest, FollowStatus, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::{connect, messages, motion, taught, track};
@@ -91,7 +91,9 @@ impl Bench {
 
     pub fn jog_ended(&mut self) -> Option<String> {
         self.until("the end of a jog", |event| match event {
-            Event::Motion(motion::Event::JogEnded { why }) => Some(why.as_ref().map(|why| why.say(Language::English))),
+            Event::Motion(motion::Event::JogEnded { why }) => {
+                Some(why.as_ref().map(|why| why.in_language(Language::English)))
+            }
             _ => None,
         })
     }
@@ -233,7 +235,7 @@ fn one_motion_at_a_time_and_a_stop_leaves_none() {
     begun(&cell, 1);
     bench.move_to(2, HOME, 1.0);
     let MotionOutcome::Refused(why) = bench.moved(2) else { panic!("it was not refused") };
-    assert_eq!(why.say(Language::English), "a motion of the joints is still under way");
+    assert_eq!(why.in_language(Language::English), "a motion of the joints is still under way");
     bench.workers.press_stop();
     assert_eq!(bench.moved(1), MotionOutcome::Stopped);
     bench.next = 0;
@@ -263,7 +265,7 @@ fn nothing_begins_before_a_stop_is_done() {
     bench.workers.press_stop();
     bench.move_to(1, HOME, 1.0);
     let MotionOutcome::Refused(why) = bench.moved(1) else { panic!("it was not refused") };
-    assert_eq!(why.say(Language::English), "The arm is being stopped");
+    assert_eq!(why.in_language(Language::English), "The arm is being stopped");
     bench.workers.hold_jog(LEFT, 0.5, None);
     assert_eq!(bench.jog_ended().as_deref(), Some("The arm is being stopped"));
     cell.script().refuse_tasks = None;
@@ -365,28 +367,30 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
     let (cell, mut bench) = fake(FakeMotions::Arrive);
     tracked(&bench);
     let joints = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
-    let follow = |bench: &Bench, id, wish| bench.workers.follow(MotionId(id), wish, 0.25).expect("the worker is there");
-    follow(&bench, 1, FollowWish::KeepViewWithRoom);
+    let follow = |bench: &Bench, id, requested| {
+        bench.workers.follow(MotionId(id), requested, 0.25).expect("the worker is there")
+    };
+    follow(&bench, 1, FollowRequest::KeepViewWithRoom);
     bench.moved(1);
     assert!(cell.script().moved.is_empty(), "there is room");
     cell.script().room = Room::At(joints.into());
-    follow(&bench, 2, FollowWish::KeepView);
+    follow(&bench, 2, FollowRequest::KeepView);
     bench.moved(2);
     assert!(cell.script().moved.is_empty(), "it was not wished");
-    follow(&bench, 3, FollowWish::KeepViewWithRoom);
+    follow(&bench, 3, FollowRequest::KeepViewWithRoom);
     bench.until("word of the move", |event| {
         matches!(event, Event::Track(track::Event::Follow(FollowStatus::MakingRoom))).then_some(())
     });
-    let said = bench.until("what it does", |event| match event {
-        Event::Messages(messages::Event::Notice { text, .. }) => Some(text.say(Language::English)),
+    let reported = bench.until("what it does", |event| match event {
+        Event::Messages(messages::Event::Notice { text, .. }) => Some(text.in_language(Language::English)),
         _ => None,
     });
-    assert!(said.contains("no room to follow the board"), "{said}");
+    assert!(reported.contains("no room to follow the board"), "{reported}");
     bench.moved(3);
     assert_eq!(cell.script().moved, [MotionGoal::Joints(joints.into())]);
     let why = Text::verbatim("the board is at the column");
     cell.script().room = Room::Nowhere(why.clone());
-    follow(&bench, 4, FollowWish::KeepViewWithRoom);
+    follow(&bench, 4, FollowRequest::KeepViewWithRoom);
     assert_eq!(bench.moved(4), MotionOutcome::Refused(why));
 }
 
@@ -395,7 +399,7 @@ fn a_stop_on_the_way_to_where_there_is_room_ends_the_following() {
     let (cell, mut bench) = fake(FakeMotions::Hang);
     tracked(&bench);
     cell.script().room = Room::At([0.0; 6].into());
-    bench.workers.follow(MotionId(1), FollowWish::KeepViewWithRoom, 0.25).expect("the worker is there");
+    bench.workers.follow(MotionId(1), FollowRequest::KeepViewWithRoom, 0.25).expect("the worker is there");
     begun(&cell, 1);
     bench.workers.press_stop();
     assert_eq!(bench.moved(1), MotionOutcome::Stopped);

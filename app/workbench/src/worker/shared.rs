@@ -22,6 +22,6 @@ pub const JOIN_DEADLINE: Duration = Duration::from_secs(2);
 pub(crate) const POLL: Duration = Duration::from_millis(5);
 
 /// A worker cannot take the request now.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("the connection does not answer; wait until it is back")]
 pub struct Busy;

@@ -197,7 +197,7 @@ fn a_stop_that_fails_is_told_and_tried_again() {
     bench.workers.press_stop();
     bench.until("the failure", |event| {
         matches!(event, Event::Messages(messages::Event::Notice { severity: Severity::Error, text })
-                if text.say(crate::text::Language::English).contains("may still move"))
+                if text.in_language(crate::text::Language::English).contains("may still move"))
     });
     cell.script().refuse_tasks = None;
     bench.until("the confirmation", |event| matches!(event, Event::Motion(motion::Event::Stopped)));

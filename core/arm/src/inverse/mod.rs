@@ -19,7 +19,7 @@ pub use obstacle::Obstacle;
 pub(super) use ur::UrGeometry;
 
 /// Why no joint values put the arm at a pose.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum IkError {
     /// No configuration reaches it, whatever the limits.

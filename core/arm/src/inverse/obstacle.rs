@@ -1,7 +1,7 @@
 //! What keeps an arm of Universal Robots from a pose.
 
 /// What is in the way of a goal.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum Obstacle {
     /// The goal is past the stretched arm.

@@ -223,18 +223,18 @@ impl<'a> Search<'a> {
         damping: f64,
         most: f64,
     ) -> Option<Values> {
-        let mut wish = Values::zeros();
+        let mut request = Values::zeros();
         for i in (0..self.count()).filter(|&i| !held[i]) {
             let range = &self.ranges[i];
             let half = (range.max - range.min) / 2.0;
             if half.is_finite() && half > 0.0 {
                 let from_middle = joints[i] - f64::midpoint(range.min, range.max);
                 let excess = (from_middle.abs() / half - COMFORT).max(0.0);
-                wish[i] = -from_middle.signum() * half * excess;
+                request[i] = -from_middle.signum() * half * excess;
             }
         }
-        let aside = free * wish;
-        let motion = wish - damped_step(free, &aside, damping)?;
+        let aside = free * request;
+        let motion = request - damped_step(free, &aside, damping)?;
         let length = motion.norm();
         Some(if length > most { motion * (most / length) } else { motion })
     }

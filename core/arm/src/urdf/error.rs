@@ -5,7 +5,7 @@ use handeye_wording::Text;
 use handeye_wording::text;
 
 /// What is wrong, in which file, and where in it: `FILE, line N: what, and what to do`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[error("{place}: {problem}", place = place(file, *line))]
 #[non_exhaustive]
 pub struct UrdfError {
@@ -27,7 +27,7 @@ fn place(file: &str, line: Option<u32>) -> Text {
 }
 
 /// A defect of a URDF file, or of what was asked of it.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum UrdfProblem {
     /// The file system says no, or it is not text.

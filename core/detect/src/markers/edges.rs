@@ -27,7 +27,7 @@ const END_PX: f64 = 2.0;
 const MIN_CROSSINGS: usize = 5;
 /// Largest deviation of crossings from the curve [px RMS]: an outline without any blur has steps of a pixel, 0.29 px RMS.
 const MAX_RMS_PX: f64 = 0.5;
-/// Times that the window is laid anew around the edge found: the first guess is off by a pixel or two.
+/// Times that the window is laid again around the edge found: the first guess is off by a pixel or two.
 const PASSES: usize = 3;
 /// How far edges may be bent when nothing is known yet: their curvature times the width of the image. A wide lens
 /// (k₁ = −0.3 at a focal length of 0.8 widths) bends them by 0.3 at the border.

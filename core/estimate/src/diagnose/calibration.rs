@@ -30,8 +30,8 @@ use nalgebra::Point3;
 
 use super::doctor::{self, Diagnosis};
 use super::findings::FindingOptions;
-use crate::claim::Claim;
 use crate::handeye::HandEyeError;
+use crate::stated_uncertainty::StatedUncertainty;
 use crate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, resolution};
 use handeye_geometry::progress::Work;
 
@@ -39,7 +39,7 @@ use handeye_geometry::progress::Work;
 #[derive(Debug, Clone)]
 pub struct Calibration {
     pub(super) fit: Fit,
-    pub(super) claim: Claim,
+    pub(super) stated: StatedUncertainty,
     pub(super) diagnosis: Diagnosis,
 }
 
@@ -100,8 +100,8 @@ impl Calibration {
     }
 
     /// Which error may be stated.
-    pub fn claim(&self) -> &Claim {
-        &self.claim
+    pub fn stated_uncertainty(&self) -> &StatedUncertainty {
+        &self.stated
     }
 
     /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
@@ -113,7 +113,7 @@ impl Calibration {
 
     /// The same at any `point`, camera coordinates in metres.
     pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
-        self.claim.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
+        self.stated.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
     }
 
     /// How far what was found and the answer does not count on would move a point where the camera saw the target, metres: a
@@ -121,7 +121,7 @@ impl Calibration {
     pub fn moved_m(&self) -> Option<f64> {
         let joint = self.joint.as_ref()?;
         let (covariance, law) = (self.hand_eye_covariance()?, joint.small_sample);
-        let (moved_m, _) = self.claim.parts_95_m(covariance, law, &joint.reference_point)?;
+        let (moved_m, _) = self.stated.parts_95_m(covariance, law, &joint.reference_point)?;
         (moved_m >= resolution::PLACE_M).then_some(moved_m)
     }
 
@@ -149,18 +149,18 @@ impl Deref for Calibration {
 mod made_up {
     use std::ops::DerefMut;
 
-    use super::{Calibration, Claim, Diagnosis, Fit};
+    use super::{Calibration, Diagnosis, Fit, StatedUncertainty};
 
     impl Calibration {
         /// As if nothing had been found.
         pub fn as_modelled(fit: Fit) -> Self {
-            Self { fit, claim: Claim::AsModelled, diagnosis: Diagnosis::default() }
+            Self { fit, stated: StatedUncertainty::AsModelled, diagnosis: Diagnosis::default() }
         }
 
         /// With another error that may be stated.
         #[must_use]
-        pub fn claiming(self, claim: Claim) -> Self {
-            Self { claim, ..self }
+        pub fn claiming(self, stated: StatedUncertainty) -> Self {
+            Self { stated, ..self }
         }
     }
 

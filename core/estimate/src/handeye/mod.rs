@@ -121,7 +121,7 @@ pub struct PosePair {
 }
 
 /// Why a hand-eye calibration has no answer.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum HandEyeError {
     /// Fewer views than the method needs.

@@ -4,7 +4,7 @@ use handeye_geometry::camera::{CameraError, FoldsBack};
 use handeye_geometry::planar_pose::PoseError;
 
 /// Why there is no calibration.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum IntrinsicsError {
     /// Not enough views.

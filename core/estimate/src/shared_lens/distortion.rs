@@ -99,7 +99,7 @@ impl Together {
     }
 }
 
-/// A session fitted anew with what the others say of the lens, with the same views, unknowns and widening.
+/// A session fitted again with what the others say of the lens, with the same views, unknowns and widening.
 pub fn again(
     prepared: &Session<'_>,
     last: &Refit,

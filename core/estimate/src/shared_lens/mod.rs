@@ -22,13 +22,13 @@ use nalgebra::DVector;
 
 use super::corners::{Prepared, Session};
 use super::refine::Refined;
-use super::uncertainty::widening;
+use super::uncertainty::overdispersion;
 use super::{CalibrateError, CameraKnowledge, Fit, Observations, Options};
-use crate::claim::Alternative;
 use crate::handeye::HandEyeError;
 use crate::handeye::joint::print_errors;
 use crate::handeye::joint::shared_lens::{self, Fitted, LensEstimate, LensInformation};
 use crate::handeye::joint::{JointSolution, LensPrior};
+use crate::stated_uncertainty::Alternative;
 use handeye_geometry::progress::Work;
 use handeye_geometry::se3;
 
@@ -36,7 +36,7 @@ pub use agreement::OddSession;
 
 use distortion::Together;
 
-/// Rounds in which outliers, the shape of the target, the robot's field and the widening are decided anew: in the first the
+/// Rounds in which outliers, the shape of the target, the robot's field and the widening are decided again: in the first the
 /// lens is near its end, and the second decides with it.
 const DECIDING: usize = 2;
 
@@ -260,7 +260,7 @@ fn fitted(
     let factor = if let Some(factor) = factor {
         factor
     } else {
-        let widening = widening::check(&problem, solution, work.cancel)?;
+        let widening = overdispersion::check(&problem, solution, work.cancel)?;
         widening.factor * widening.lens
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.

@@ -1,9 +1,9 @@
 use super::*;
-use crate::claim::Claim;
 use crate::diagnose::findings::{FindingCode, FindingOptions, Severity};
 use crate::diagnose::{Calibration, examine};
 use crate::handeye::Mode;
 use crate::handeye::joint::Noise;
+use crate::stated_uncertainty::StatedUncertainty;
 use crate::{Method, fit};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
@@ -103,8 +103,8 @@ fn another_lens_is_a_warning_that_the_stated_error_counts_and_one_that_hardly_di
     assert_eq!(severity, Severity::Warning);
     assert!(text.starts_with("The sessions do not have one lens: B (focal length 59"), "{text}");
     let own = known(first).with_own_lens.clone();
-    let claim = examined.claim();
-    assert!(matches!(claim, Claim::Moved(all) if all.contains(&own)), "{claim:?}");
+    let claim = examined.stated_uncertainty();
+    assert!(matches!(claim, StatedUncertainty::Moved(all) if all.contains(&own)), "{claim:?}");
     let modelled = first.modelled_error_95_m().expect("stated");
     let moved = own.moved_m(&first.joint.as_ref().expect("joint").reference_point);
     assert!(examined.tip_error_95_m().expect("stated") >= modelled + moved && moved > 0.0);
@@ -114,9 +114,9 @@ fn another_lens_is_a_warning_that_the_stated_error_counts_and_one_that_hardly_di
         (odd.focal_px, odd.centre_apart_px) = (odd.others_focal_px * 1.002, 1.0);
     }
     let (finding, examined) = diagnosed(&sessions[0], first.clone());
-    let claim = examined.claim();
+    let claim = examined.stated_uncertainty();
     assert_eq!(finding.expect("said").0, Severity::Advice);
-    assert!(!matches!(claim, Claim::Moved(all) if all.contains(&own)), "{claim:?}");
+    assert!(!matches!(claim, StatedUncertainty::Moved(all) if all.contains(&own)), "{claim:?}");
     first.shared_lens.as_mut().expect("shared").odd.clear();
     assert_eq!(diagnosed(&sessions[0], first.clone()).0, None);
 }

@@ -6,7 +6,8 @@ use super::VerifyError;
 use crate::diagnose::Calibration;
 use crate::handeye::HandEye;
 use crate::handeye::joint::{
-    CornerWeights, DepthWeight, Free, Noise, RobotField, SmallSample, camera_from_target, corrected_base_from_tip,
+    CornerWeights, DepthWeight, Free, Noise, PoseDependentError, SmallSample, camera_from_target,
+    corrected_base_from_tip,
 };
 use crate::resolution;
 use crate::uncertainty::quality;
@@ -33,7 +34,7 @@ pub struct Predictor {
     /// counts on none.
     pub joint_offsets_rad: Vec<f64>,
     /// Errors of the robot that depend on where it stands, where the calibration found them.
-    pub field: Option<RobotField>,
+    pub field: Option<PoseDependentError>,
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// How the error of the hand-eye transform is distributed in units of that covariance.

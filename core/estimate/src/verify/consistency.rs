@@ -15,7 +15,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
 use super::{CaptureCheck, Predictor, Uncertainty};
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::field::{self, SLOPES};
+use crate::handeye::joint::pose_dependent_error::{self, SLOPES};
 use crate::resolution;
 use handeye_geometry::se3;
 use handeye_geometry::targets::bent::BoardPoints;
@@ -119,7 +119,7 @@ impl Sums {
         by_shared.columns_mut(LINKS, form).copy_from(&by_form);
         by_shared.columns_mut(LINKS + form, joints).copy_from(&chain.by_joints.columns(0, joints));
         if let Some(field) = &calibrated.field {
-            let columns = field::columns(&field.place(&view.base_from_tip), &chain.by_correction);
+            let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
             by_shared.columns_mut(LINKS + form + joints, SLOPES).copy_from(&columns);
         }
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()

@@ -30,7 +30,7 @@ pub use depth_camera::{DepthCheck, DepthErrors, DepthReport, Estimated};
 pub use points::MeasuredPoint;
 
 /// Why there is nothing to verify with.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum VerifyError {
     /// The calibration is of a camera alone.

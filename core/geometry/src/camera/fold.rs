@@ -11,7 +11,7 @@ const DIRECTIONS: u32 = 72;
 const STEPS: u32 = 1000;
 
 /// The lens model turns back within the image, so that pixels beyond have no ray, or that of another pixel.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[error(
     "the {model} distortion {coefficients:?} folds back {radius_px:.0} px from the principal point, inside of the image, which reaches \
      {reach_px:.0} px: that is no lens; check order and signs of the coefficients, focal lengths and image size, or \

@@ -21,7 +21,7 @@ pub const MAX_PARAMETERS: usize = 12;
 pub type PixelByParameters = SMatrix<f64, 2, MAX_PARAMETERS>;
 
 /// What a camera model cannot do with a point or a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum CameraError {
     /// The point has no image: it lies on or behind the camera plane.

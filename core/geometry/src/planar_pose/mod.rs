@@ -51,7 +51,7 @@ const SAME_ROTATION: f64 = 1e-4;
 const POSSIBLE_EXCESS: f64 = 4.75 * 4.75;
 
 /// Why corners have no pose.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum PoseError {
     /// The distance between points is not a length.

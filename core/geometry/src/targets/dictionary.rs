@@ -81,7 +81,7 @@ impl Dictionary {
 }
 
 /// A family that is not known.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error("marker family {0:?} is not known: it is one of {list}", list = names())]
 pub struct UnknownDictionary(pub String);
 

@@ -74,7 +74,7 @@ impl Grid {
 }
 
 /// A number of a target that cannot be.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[error("{key} = {value} is not usable: it must be {want}")]
 pub struct BadTarget {
     /// Which, as a data set calls it.
@@ -250,23 +250,23 @@ fn length(key: &'static str, value: f64) -> Result<(), BadTarget> {
 
 impl TargetSpec {
     /// What it is, with its sizes.
-    pub fn said(&self) -> Text {
+    pub fn text(&self) -> Text {
         let Grid { columns, rows, square_m } = self.grid();
-        let said = match self {
+        let reported = match self {
             Self::Chessboard(_) => text!("chessboard of {columns}×{rows} inner corners, {mm} mm apart"),
             Self::Circles(_) => text!("circle grid of {columns}×{rows} dots, {mm} mm apart"),
             Self::AsymmetricCircles(_) => text!("asymmetric circle grid of {columns}×{rows} dots, rows {mm} mm apart"),
-            Self::Charuco(board) => return board.said(),
-            Self::AprilGrid(board) => return board.said(),
-            Self::AprilTag(tag) => return tag.said(),
+            Self::Charuco(board) => return board.text(),
+            Self::AprilGrid(board) => return board.text(),
+            Self::AprilTag(tag) => return tag.text(),
         };
-        said.with("columns", columns).with("rows", rows).with("mm", mm(square_m))
+        reported.with("columns", columns).with("rows", rows).with("mm", mm(square_m))
     }
 }
 
 impl fmt::Display for TargetSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.said().fmt(f)
+        self.text().fmt(f)
     }
 }
 

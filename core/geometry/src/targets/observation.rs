@@ -58,7 +58,7 @@ impl Corners {
         }
     }
 
-    /// Numbers them anew; they are then sorted by number.
+    /// Numbers them again; they are then sorted by number.
     fn renumber(&mut self, number: impl Fn(usize) -> usize) {
         for corner in self.iter_mut() {
             corner.index = number(corner.index);

@@ -45,7 +45,7 @@ pub struct Charuco {
     pub marker_m: f64,
     /// Family of the markers.
     pub dictionary: Dictionary,
-    /// Which squares have the markers; told apart from each image where it is not said.
+    /// Which squares have the markers; told apart from each image where it is not reported.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layout: Option<Layout>,
 }
@@ -101,8 +101,8 @@ impl Charuco {
 }
 
 impl Charuco {
-    pub(super) fn said(&self) -> Text {
-        let said = match self.layout {
+    pub(super) fn text(&self) -> Text {
+        let reported = match self.layout {
             None => text!(
                 "ChArUco board of {columns}×{rows} inner corners, {square} mm apart, markers {family} of {marker} mm"
             ),
@@ -110,9 +110,9 @@ impl Charuco {
                 "ChArUco board of {columns}×{rows} inner corners, {square} mm apart, markers {family} of {marker} mm, {layout} layout"
             ),
         };
-        let said = said.with("columns", self.columns).with("rows", self.rows).with("square", mm(self.square_m));
-        let said = said.with("family", self.dictionary.name().to_owned()).with("marker", mm(self.marker_m));
-        said.with("layout", self.layout.map_or_else(String::new, |layout| layout.name().to_owned()))
+        let reported = reported.with("columns", self.columns).with("rows", self.rows).with("square", mm(self.square_m));
+        let reported = reported.with("family", self.dictionary.name().to_owned()).with("marker", mm(self.marker_m));
+        reported.with("layout", self.layout.map_or_else(String::new, |layout| layout.name().to_owned()))
     }
 }
 
@@ -157,7 +157,7 @@ pub struct AprilGrid {
     pub first_id: usize,
     /// Family of the tags.
     pub family: Dictionary,
-    /// Width of the black border in bits: 2 on Kalibr's boards, 1 elsewhere. Both are looked for where it is not said.
+    /// Width of the black border in bits: 2 on Kalibr's boards, 1 elsewhere. Both are looked for where it is not reported.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border_bits: Option<usize>,
     /// Which tag is the first.
@@ -242,7 +242,7 @@ impl AprilGrid {
 }
 
 impl AprilGrid {
-    pub(super) fn said(&self) -> Text {
+    pub(super) fn text(&self) -> Text {
         text!(
             "AprilGrid of {columns}×{rows} tags {family} of {tag} mm, {gap} mm between them, first tag {first}",
             columns = self.columns,
@@ -264,7 +264,7 @@ pub struct AprilTag {
     pub id: usize,
     /// Its family.
     pub family: Dictionary,
-    /// Width of the black border in bits, 1 where it is not said.
+    /// Width of the black border in bits, 1 where it is not reported.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border_bits: Option<usize>,
 }
@@ -286,7 +286,7 @@ impl AprilTag {
 }
 
 impl AprilTag {
-    pub(super) fn said(&self) -> Text {
+    pub(super) fn text(&self) -> Text {
         text!(
             "tag {id} of {family}, {mm} mm wide",
             id = self.id,

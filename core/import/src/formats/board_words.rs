@@ -60,14 +60,14 @@ impl Format for BoardWords {
 
     fn read(&self, file: &File, reader: &mut Reader<'_>) -> bool {
         if reader.recording.targets.is_empty() {
-            reader.recording.beliefs.extend(file.value().and_then(|value| told(value, &file.name())));
+            reader.recording.beliefs.extend(file.value().and_then(|value| stated(value, &file.name())));
         }
         false
     }
 }
 
 /// A sentence with the option to give, where a document names rows, columns and a square.
-fn told(value: &Value, file: &str) -> Option<Text> {
+fn stated(value: &Value, file: &str) -> Option<Text> {
     let mut found = Found::default();
     found.look(value, 0);
     let (columns, rows) = found.count?;
@@ -143,14 +143,18 @@ mod tests {
 
     #[test]
     fn the_option_to_give_is_told_however_the_fields_are_called() {
-        let of_json = |text: &str| told(&json(text).expect("JSON"), "config.json").map(|said| said.to_string());
-        let said = of_json(r#"{"camera": {"chessboard_size": [9, 6], "square_size_mm": 25}}"#).expect("a board");
-        assert!(said.contains("give --target 9x6x25") && said.contains("if those are inner corners"), "{said}");
-        let said = of_json(r#"{"board": {"cols": 11, "rows": 8, "square_length": 0.02}}"#).expect("a board");
-        assert!(said.ends_with("--target 11x8x20"), "{said}");
+        let of_json =
+            |text: &str| stated(&json(text).expect("JSON"), "config.json").map(|reported| reported.to_string());
+        let reported = of_json(r#"{"camera": {"chessboard_size": [9, 6], "square_size_mm": 25}}"#).expect("a board");
+        assert!(
+            reported.contains("give --target 9x6x25") && reported.contains("if those are inner corners"),
+            "{reported}"
+        );
+        let reported = of_json(r#"{"board": {"cols": 11, "rows": 8, "square_length": 0.02}}"#).expect("a board");
+        assert!(reported.ends_with("--target 11x8x20"), "{reported}");
         let documents = yaml("board_squaresX: 5\nboard_squaresY: 7\nsquare_size_m: 0.0365\n").expect("YAML");
-        let said = told(&documents[0], "board.yaml").expect("a board").to_string();
-        assert!(said.ends_with("--target 5x7x36.5"), "{said}");
+        let reported = stated(&documents[0], "board.yaml").expect("a board").to_string();
+        assert!(reported.ends_with("--target 5x7x36.5"), "{reported}");
         // Sizes of images and boards without a square are none.
         assert_eq!(of_json(r#"{"board_image": [640, 480], "square_size": 25}"#), None);
         assert_eq!(of_json(r#"{"chessboard_size": [9, 6]}"#), None);

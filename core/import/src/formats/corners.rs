@@ -140,7 +140,7 @@ fn of_views(name: &str, views: &[View<'_>], whole: Option<&Value>) -> (Vec<Strea
     for (path, _) in views.iter().flat_map(|view| &view.lists) {
         *paths.entry(path).or_default() += 1;
     }
-    let said = |view: &View<'_>| size(view.value, 0).or_else(|| size(whole?, 0));
+    let reported = |view: &View<'_>| size(view.value, 0).or_else(|| size(whole?, 0));
     let mut streams = Vec::new();
     let mut counts: Vec<usize> = Vec::new();
     for (path, count) in paths {
@@ -153,7 +153,7 @@ fn of_views(name: &str, views: &[View<'_>], whole: Option<&Value>) -> (Vec<Strea
         for view in views {
             let list = view.lists.iter().find(|(it, _)| it == path).map(|(_, list)| list.clone());
             counts.extend(list.iter().map(Vec::len));
-            sizes.push(said(view));
+            sizes.push(reported(view));
             images.push(ImageFile { path: view.file.clone(), number: view.number, same_as: None, stamp_ns: None });
             points.push(list);
         }
@@ -335,7 +335,7 @@ pub(crate) fn numbered(points: &[Point], target: &TargetSpec) -> Result<Vec<Corn
         other => {
             return Err(text!(
                 "recorded corners are those of a chessboard or a grid of dots, and {other} was given",
-                other = other.said()
+                other = other.text()
             ));
         }
     };

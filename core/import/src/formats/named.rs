@@ -147,7 +147,7 @@ fn of_form(why: &str, forms: Vec<RotationForm>) -> Stated {
     Stated { rotation: Some(Known::by(format!("the names {why}"), forms)), ..Stated::default() }
 }
 
-/// Three angles by name; of roll, pitch and yaw the axes are said with them.
+/// Three angles by name; of roll, pitch and yaw the axes are reported with them.
 fn three_angles(value: &Value, names: &[[&str; 3]]) -> Option<Found<Vec<f64>>> {
     let roll = three_in(value, ["roll", "pitch", "yaw"], &ANGLES).map(|(numbers, angle)| {
         let stated = Stated { rotation: Some(roll_pitch_yaw("roll pitch yaw")), angle, ..Stated::default() };
@@ -224,12 +224,12 @@ mod tests {
             r#"{"robot_translation_mm": [1, 2, 3], "robot_rotation_deg": [10, 20, 30],
                 "T_cam_target_rvec": [[0.1], [0.2], [0.3]], "T_cam_target_tvec": [[4], [5], [6]], "lone_tvec": [7, 8, 9]}"#,
         );
-        let [(robot, at, said), (target, seen, meant)] = found.as_slice() else { panic!("{found:?}") };
+        let [(robot, at, reported), (target, seen, meant)] = found.as_slice() else { panic!("{found:?}") };
         assert_eq!((robot.as_str(), target.as_str()), ("robot", "T_cam_target"));
         assert_eq!(*at, Numbers::Angles([1.0, 2.0, 3.0, 10.0, 20.0, 30.0]));
-        assert_eq!(said.length.as_ref().map(|known| known.value), Some(LengthUnit::Millimetre));
-        assert_eq!(said.angle.as_ref().map(|known| known.value), Some(AngleUnit::Degree));
-        assert!(said.rotation.is_none(), "degrees about which axes is not said");
+        assert_eq!(reported.length.as_ref().map(|known| known.value), Some(LengthUnit::Millimetre));
+        assert_eq!(reported.angle.as_ref().map(|known| known.value), Some(AngleUnit::Degree));
+        assert!(reported.rotation.is_none(), "degrees about which axes is not said");
         assert_eq!(*seen, Numbers::Angles([4.0, 5.0, 6.0, 0.1, 0.2, 0.3]));
         assert!(meant.length.is_none() && meant.angle.is_none());
         assert_eq!(meant.rotation.as_ref().map(|known| known.value.clone()), Some(vec![RotationForm::Vector]));

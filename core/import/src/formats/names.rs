@@ -118,7 +118,7 @@ fn angle_unit(word: &str) -> Option<AngleUnit> {
 mod tests {
     use super::*;
 
-    fn said(key: &str) -> Option<(Part, String)> {
+    fn reported(key: &str) -> Option<(Part, String)> {
         of(key).map(|name| (name.part, name.whose))
     }
 
@@ -134,10 +134,10 @@ mod tests {
             ("rotation_quaternion", Part::Rotation, ""),
             ("tVec", Part::Translation, ""),
         ] {
-            assert_eq!(said(key), Some((part, whose.to_owned())), "{key}");
+            assert_eq!(reported(key), Some((part, whose.to_owned())), "{key}");
         }
         for key in ["camera_matrix", "pose", "position_and_rotation", "image", "arm_t_end", ""] {
-            assert_eq!(said(key), None, "{key}");
+            assert_eq!(reported(key), None, "{key}");
         }
     }
 

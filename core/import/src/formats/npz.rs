@@ -147,8 +147,8 @@ fn series(file: &str, arrays: &[Array]) -> Vec<Track> {
         });
         let mut stated = Stated::default();
         let samples = rows.iter().enumerate().filter_map(|(i, row)| {
-            let (numbers, said) = tree::of_numbers(row, &array.name)?;
-            stated = said;
+            let (numbers, reported) = tree::of_numbers(row, &array.name)?;
+            stated = reported;
             let place = text!("{file}, {array} entry {entry}", file = file, array = &array.name, entry = i + 1);
             let place = Arc::new(place);
             Some(Sample { image: named.map(|n| n[i].clone()), number: None, place, numbers, joints: Vec::new() })

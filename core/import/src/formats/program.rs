@@ -169,7 +169,7 @@ mod tests {
         (track.samples[0].numbers, track.stated)
     }
 
-    fn said(stated: &Stated) -> (LengthUnit, RotationForm, Option<AngleUnit>) {
+    fn reported(stated: &Stated) -> (LengthUnit, RotationForm, Option<AngleUnit>) {
         let form = stated.rotation.as_ref().expect("said").value[0];
         (stated.length.as_ref().expect("said").value, form, stated.angle.as_ref().map(|known| known.value))
     }
@@ -180,12 +180,15 @@ mod tests {
         let (numbers, stated) =
             first(&three(&|i| format!("  movej(p[0.1, -0.2, 0.{i}, 1.5, 0, -3e-1], a=1.4) # a{i}.png")));
         assert_eq!(numbers, Numbers::Angles([0.1, -0.2, 0.0, 1.5, 0.0, -0.3]));
-        assert_eq!(said(&stated), (LengthUnit::Metre, RotationForm::Vector, Some(AngleUnit::Radian)));
+        assert_eq!(reported(&stated), (LengthUnit::Metre, RotationForm::Vector, Some(AngleUnit::Radian)));
         let krl = "DECL E6POS XP";
         let (numbers, stated) =
             first(&three(&|i| format!("{krl}{i}={{X 400.5,Y {i},Z 300.0,A 90.0,B -1.5,C 180.0,S 2,T 10,E1 0.0}}")));
         assert_eq!(numbers, Numbers::Angles([400.5, 0.0, 300.0, 90.0, -1.5, 180.0]));
-        assert_eq!(said(&stated), (LengthUnit::Millimetre, RotationForm::Euler(Euler::KUKA), Some(AngleUnit::Degree)));
+        assert_eq!(
+            reported(&stated),
+            (LengthUnit::Millimetre, RotationForm::Euler(Euler::KUKA), Some(AngleUnit::Degree))
+        );
         let (numbers, stated) = first(&three(&|i| {
             format!(
                 "P[{i}]{{\n GP1:\n  UF : 0, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n  X = {i}.5 mm, Y = -20 mm, Z = 3 mm,\n  \
@@ -193,12 +196,15 @@ mod tests {
             )
         }));
         assert_eq!(numbers, Numbers::Angles([0.5, -20.0, 3.0, 179.0, 0.5, -90.0]));
-        assert_eq!(said(&stated), (LengthUnit::Millimetre, RotationForm::Euler(Euler::RPY), Some(AngleUnit::Degree)));
+        assert_eq!(
+            reported(&stated),
+            (LengthUnit::Millimetre, RotationForm::Euler(Euler::RPY), Some(AngleUnit::Degree))
+        );
         let (numbers, stated) = first(&three(&|i| {
             format!("CONST robtarget p{i}:=[[600.0,{i},700],[0.6,0,0.8,0],[0,0,-1,0],[9E9,9E9,9E9,9E9,9E9,9E9]];")
         }));
         assert_eq!(numbers, Numbers::Quaternion([600.0, 0.0, 700.0, 0.6, 0.0, 0.8, 0.0]));
-        assert_eq!(said(&stated), (LengthUnit::Millimetre, RotationForm::Wxyz, None));
+        assert_eq!(reported(&stated), (LengthUnit::Millimetre, RotationForm::Wxyz, None));
     }
 
     #[test]

@@ -93,7 +93,7 @@ fn runs(text: &str) -> Option<Vec<Run>> {
                 continue;
             }
             let word = word.to_lowercase();
-            // A name is on one line; what was said on lines before is about other things.
+            // A name is on one line; what was reported on lines before is about other things.
             match runs.last_mut().filter(|run| run.numbers.is_empty() && !is_first) {
                 Some(run) => run.words.push(word),
                 None => runs.push(Run { words: vec![word], numbers: Vec::new() }),

@@ -38,7 +38,7 @@ const SAME: f64 = 0.01;
 
 /// Whose poses they are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Whose {
+pub(super) enum PoseOwner {
     /// Those of the camera that saw the target.
     Camera,
     /// Those of another camera that sees the same target; a base that was taught on the target looks the same.
@@ -47,15 +47,15 @@ pub(super) enum Whose {
 
 /// Whose poses a solution tells; `None`: those of an arm, as far as can be told. `over_noise` is the square of the residual of every
 /// view over what the noise of its corners causes.
-pub(super) fn whose(sight: &Sight, solution: &ClosedFormSolution, over_noise: &[f64]) -> Option<Whose> {
+pub(super) fn whose(sight: &Sight, solution: &ClosedFormSolution, over_noise: &[f64]) -> Option<PoseOwner> {
     let is_camera = is_of_camera(solution.mount_from_camera.isometry(), sight.target.distance_m);
     let anchor_from_target = solution.anchor_from_target.isometry();
     if is_camera && (is_on_target(anchor_from_target, sight) || knows_the_noise(over_noise)) {
-        return Some(Whose::Camera);
+        return Some(PoseOwner::Camera);
     }
     let apart_m = anchor_from_target.translation.vector.norm();
     let is_same = apart_m < SAME * sight.target.distance_m && anchor_from_target.rotation.angle() < SAME;
-    is_same.then_some(Whose::OtherCamera)
+    is_same.then_some(PoseOwner::OtherCamera)
 }
 
 fn is_of_camera(mount_from_camera: &Isometry3<f64>, distance_m: f64) -> bool {

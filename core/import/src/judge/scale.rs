@@ -1,4 +1,4 @@
-//! Hypotheses that explain the images, but far better with a target of another size than was said.
+//! Hypotheses that explain the images, but far better with a target of another size than was reported.
 
 use super::trial::Judge;
 use crate::hypothesis::{Hypothesis, Source};

@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use super::Sights;
 use super::cases::{Case, Paired};
 use super::field_of_view;
-use super::own_poses::{self, Whose};
+use super::own_poses::{self, PoseOwner};
 use crate::conventions::{Direction, Reading};
 use crate::formats::tree::LEAST_POSES;
 use crate::hypothesis::{Fit, Hypothesis, Source};
@@ -266,7 +266,7 @@ impl Judge<'_> {
         let of = self.source_name(case.source);
         let track = &self.recording.tracks[case.robot];
         match own_poses::whose(sight, solution, &over_noise)? {
-            Whose::Camera => {
+            PoseOwner::Camera => {
                 let why = text!(
                     "these poses are the camera's own poses, computed from the target in {of} as calibrateCamera and solvePnP do \
                      (the target in the camera, or the camera as seen from the target), and none of a robot",
@@ -277,7 +277,7 @@ impl Judge<'_> {
             }
             // A person who names the series has said whose it is, and so has a file that calls it the robot's. Of one camera alone
             // with neutral names the base may be the target's frame.
-            Whose::OtherCamera => {
+            PoseOwner::OtherCamera => {
                 let cameras = self.recording.streams.iter().filter(|stream| !stream.is_depth).count();
                 let may_be = matches!(case.source, Source::Track(_)) || cameras > 1;
                 (may_be && track.role == Role::Unknown && self.settings.poses.is_none()).then(|| {

@@ -88,10 +88,12 @@ impl ViewRange {
     }
 
     /// Whether it is in spite of what is not known, with `doubts` times the usual margin for that.
-    pub fn surely_shows(&self, target: &TargetSpec, expected: &ExpectedPixels<'_>, doubts: f64) -> bool {
+    pub fn surely_shows(&self, target: &TargetSpec, expected: &ExpectedPixels<'_>, doubt_factor: f64) -> bool {
         let intrinsics = expected.intrinsics();
         let inside = |point: &Point3<f64>| {
-            expected.of(point).is_some_and(|(px, sigma_px)| self.holds(intrinsics, &px, &(sigma_px * SURE * doubts)))
+            expected
+                .of(point)
+                .is_some_and(|(px, sigma_px)| self.holds(intrinsics, &px, &(sigma_px * SURE * doubt_factor)))
         };
         outline(target).iter().all(inside) && self.is_large(intrinsics, target, expected.camera_from_target())
     }

@@ -64,7 +64,7 @@ pub struct ChooseOptions<'a> {
     /// How far the tip may turn from the nearest view so far, radians.
     pub turn_rad: f64,
     /// Factor on how unsure it is where the board will be in the image; 1 as long as it was where it was expected.
-    pub doubts: f64,
+    pub doubt_factor: f64,
 }
 
 /// A view that is proposed.
@@ -191,7 +191,7 @@ impl Chooser<'_> {
                 continue;
             }
             let pixels = self.model.pixels(&base_from_tip, design.covariance());
-            if !self.range.surely_shows(target, &pixels, options.doubts) {
+            if !self.range.surely_shows(target, &pixels, options.doubt_factor) {
                 continue;
             }
             let camera_from_target = Pose::from_isometry(*pixels.camera_from_target());

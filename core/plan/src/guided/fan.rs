@@ -16,7 +16,7 @@ const LARGEST_RAD: f64 = 14.0 * std::f64::consts::PI / 180.0;
 const LEAST_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// Part of the room in the image that a turn may use: the lever may use as much again.
 const PART: f64 = 0.45;
-/// By which the turns grow when it begins anew.
+/// By which the turns grow when it begins again.
 const LARGER: f64 = 1.4;
 /// Axes of the tip in the order in which it is turned about them.
 const TURNS: [[f64; 3]; 8] = [
@@ -41,7 +41,7 @@ pub fn free_turn_rad(corners_px: impl Iterator<Item = Vector2<f64>>, image_size:
 }
 
 /// Pose `index` of the fan about a tip pose, and its turn \[rad\], with turns of `turn_rad` at first. After the last one it
-/// begins anew with larger turns, because the board was seen from all; with turns half as large for each two of `failed` poses
+/// begins again with larger turns, because the board was seen from all; with turns half as large for each two of `failed` poses
 /// that did not show it.
 pub fn pose(about: &Pose<Base, Tip>, index: usize, turn_rad: f64, failed: usize) -> (Pose<Base, Tip>, f64) {
     let axis = Unit::new_normalize(Vector3::from(TURNS[index % TURNS.len()]));

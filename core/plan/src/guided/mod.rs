@@ -34,9 +34,9 @@ use candidates::ViewRange;
 use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot, with_board};
 use design::Design;
 use handeye_arm::JointValues;
-use handeye_estimate::claim::Claim;
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, ViewModel};
+use handeye_estimate::stated_uncertainty::StatedUncertainty;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_estimate::{Fit, Observations, ViewStatus};
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -439,7 +439,7 @@ impl Guide {
             } else {
                 turn_after(self.skips)
             },
-            doubts: self.doubts(),
+            doubt_factor: self.doubt_factor(),
         };
         let chooser = ground.chooser(model, &known.observations.target);
         Some((chooser.plan(&ground.design, &options), modelled_m))
@@ -461,7 +461,7 @@ impl Guide {
             dwell_s: self.options.dwell_s,
             failed: &self.failed,
             turn_rad: turn_after(skips),
-            doubts: 1.0,
+            doubt_factor: 1.0,
         };
         ground.chooser(&model, target).at_random(&ground.design, &options)
     }
@@ -492,7 +492,7 @@ impl Guide {
     }
 
     /// What failed was expected to be in the image: the estimate is worse than it says.
-    fn doubts(&self) -> f64 {
+    fn doubt_factor(&self) -> f64 {
         1.0 + self.failures as f64
     }
 
@@ -500,10 +500,10 @@ impl Guide {
     /// small part of the goal, is none that has to be resolved for this goal.
     fn is_sound(&self, calibration: Option<&Calibration>) -> bool {
         let Some(calibration) = calibration else { return false };
-        match calibration.claim() {
-            Claim::AsModelled => true,
-            Claim::Nothing => false,
-            claim @ Claim::Moved(_) => {
+        match calibration.stated_uncertainty() {
+            StatedUncertainty::AsModelled => true,
+            StatedUncertainty::Nothing => false,
+            claim @ StatedUncertainty::Moved(_) => {
                 let moved_m = worst(calibration, self.options.tool_box.as_ref(), |point| Some(claim.moved_m(point)));
                 moved_m.is_some_and(|moved_m| moved_m <= SMALL_PART * self.options.goal_m)
             }

@@ -80,7 +80,7 @@ impl Guide {
 
     /// A tilt about the board; `None` where no rough answer is found, or all were tried.
     fn tilt(&mut self, known: &Known<'_>, first: &Pose<Base, Tip>, cancel: &CancelToken) -> Option<Next> {
-        let rough = RoughAnswer::new(known, first, self.doubts(), cancel)?;
+        let rough = RoughAnswer::new(known, first, self.doubt_factor(), cancel)?;
         let left = self.tilts_tried..2 * AXES.len();
         let axis = |index: usize| AXES[index % AXES.len()];
         let sure = left.clone().find_map(|index| {
@@ -88,7 +88,7 @@ impl Guide {
             Some((index, largest))
         });
         let (index, next) = sure.or_else(|| {
-            let deg = UNSURE_TILT_DEG / rough.doubts;
+            let deg = UNSURE_TILT_DEG / rough.doubt_factor;
             left.clone().find_map(|index| Some((index, rough.tilted(axis(index), deg, false)?)))
         })?;
         self.tilts_tried = index + 1;
@@ -104,11 +104,11 @@ struct RoughAnswer {
     range: ViewRange,
     seen_first: Pose<Camera, Target>,
     robot: Option<Robot>,
-    doubts: f64,
+    doubt_factor: f64,
 }
 
 impl RoughAnswer {
-    fn new(known: &Known<'_>, first: &Pose<Base, Tip>, doubts: f64, cancel: &CancelToken) -> Option<Self> {
+    fn new(known: &Known<'_>, first: &Pose<Base, Tip>, doubt_factor: f64, cancel: &CancelToken) -> Option<Self> {
         let observations = known.observations;
         let target = observations.target;
         let fixed = Observations { camera: CameraKnowledge::Fixed(lens(observations)), ..observations.clone() };
@@ -129,7 +129,7 @@ impl RoughAnswer {
         });
         let seen_first = model.hand_eye().camera_from_target(first);
         let range = ViewRange::about([(seen_first.isometry() * target.centre()).coords.norm()].into_iter())?;
-        Some(Self { model, target, design, range, seen_first, robot, doubts })
+        Some(Self { model, target, design, range, seen_first, robot, doubt_factor })
     }
 
     /// The camera tilted about the board, from the nearest distance from which that is in the image, surely or as far as is
@@ -143,7 +143,7 @@ impl RoughAnswer {
             let base_from_tip = self.model.base_from_tip(&camera_from_target);
             let is_shown = if surely {
                 let pixels = self.model.pixels(&base_from_tip, self.design.covariance());
-                self.range.surely_shows(&self.target, &pixels, self.doubts)
+                self.range.surely_shows(&self.target, &pixels, self.doubt_factor)
             } else {
                 self.range.shows(self.model.intrinsics(), &self.target, &camera_from_target)
             };

@@ -5,8 +5,8 @@ use crate::testing::clutter::{Tally, session};
 use crate::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Places};
 use crate::{ArmBody, Carried, Surroundings};
 use handeye_arm::ArmKind;
-use handeye_estimate::claim::Alternative;
 use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_estimate::stated_uncertainty::Alternative;
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::Links;
 use handeye_simulate::session::{REALISTIC, camera};
@@ -334,9 +334,9 @@ fn an_answer_that_something_speaks_against_is_no_success_however_small_its_error
     let _begun = cell.run(GuidedOptions { most_views: 12, least_gain: 0.0, ..options(1e-9) });
     let moved = |metres: f64| {
         let shift = nalgebra::Vector6::new(metres, 0.0, 0.0, 0.0, 0.0, 0.0);
-        Claim::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }])
+        StatedUncertainty::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }])
     };
-    let endings = [Claim::AsModelled, Claim::Nothing, moved(5e-5), moved(2e-4)].map(|claim| {
+    let endings = [StatedUncertainty::AsModelled, StatedUncertainty::Nothing, moved(5e-5), moved(2e-4)].map(|claim| {
         let mut guide = Guide::new(GuidedOptions { least_gain: 1.0, ..options(1e-3) });
         let all = cell.observations.views.clone();
         let mut ending = None;
@@ -362,7 +362,7 @@ fn below_the_goal_it_says_why_it_goes_on() {
     let mut cell = GuidedCell::new(CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 1));
     let _begun = cell.run(GuidedOptions { most_views: 12, least_gain: 0.0, ..options(1e-9) });
     let all = cell.observations.views.clone();
-    let mut hold = |views: usize, goal_m: f64, claim: Claim| {
+    let mut hold = |views: usize, goal_m: f64, claim: StatedUncertainty| {
         cell.observations.views = all[..views].to_vec();
         let calibration = cell.calibrate().expect("good views").claiming(claim);
         let mut guide = Guide::new(options(goal_m));
@@ -370,16 +370,17 @@ fn below_the_goal_it_says_why_it_goes_on() {
         (guide.hold(), calibration.tip_error_95_m().expect("stated"), error_at_upper_levels(&calibration, None))
     };
     let far_m = 1e-3;
-    assert_eq!(hold(LEAST_VIEWS - 1, far_m, Claim::AsModelled).0, Some(Hold::FewViews));
-    assert_eq!(hold(12, far_m, Claim::AsModelled).0, Some(Hold::Confirmation));
+    assert_eq!(hold(LEAST_VIEWS - 1, far_m, StatedUncertainty::AsModelled).0, Some(Hold::FewViews));
+    assert_eq!(hold(12, far_m, StatedUncertainty::AsModelled).0, Some(Hold::Confirmation));
     let shift = nalgebra::Vector6::new(2e-4, 0.0, 0.0, 0.0, 0.0, 0.0);
-    let moved = Claim::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }]);
+    let moved =
+        StatedUncertainty::Moved(vec![Alternative { shift, covariance: nalgebra::Matrix6::identity() * 1e-12 }]);
     assert_eq!(hold(12, far_m, moved).0, Some(Hold::Doubted));
-    let (above, stated_m, upper_m) = hold(12, 1e-9, Claim::AsModelled);
+    let (above, stated_m, upper_m) = hold(12, 1e-9, StatedUncertainty::AsModelled);
     assert_eq!(above, None, "it is above the goal, which explains itself");
     let upper_m = upper_m.expect("known");
     assert_eq!(
-        hold(12, f64::midpoint(stated_m, upper_m), Claim::AsModelled).0,
+        hold(12, f64::midpoint(stated_m, upper_m), StatedUncertainty::AsModelled).0,
         Some(Hold::NoiseLevels { error_m: upper_m })
     );
 }
@@ -406,9 +407,9 @@ fn a_board_that_may_lie_partly_outside_the_image_is_not_surely_seen() {
     let seen = truth.camera_from_target(&tip);
     let target = &cell.observations.target;
     let range = ViewRange::about([seen.translation().norm()].into_iter()).expect("in front of the camera");
-    let surely = |sigma_rad: f64, doubts: f64| {
+    let surely = |sigma_rad: f64, doubt_factor: f64| {
         let covariance = nalgebra::DMatrix::identity(truth.unknowns(), truth.unknowns()) * sigma_rad.powi(2);
-        range.surely_shows(target, &truth.pixels(&tip, &covariance), doubts)
+        range.surely_shows(target, &truth.pixels(&tip, &covariance), doubt_factor)
     };
     assert!(range.shows(truth.intrinsics(), target, &seen));
     assert!(surely(1e-4, 1.0) && !surely(0.3, 1.0));

@@ -19,7 +19,7 @@ const FARTHEST_M: f64 = 10.0;
 const FASTEST_M_S: f64 = 20.0;
 
 /// What is wrong with a file of surroundings, in one line.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum SurroundingsError {
     /// The file system does not give it.
@@ -137,7 +137,7 @@ impl EntryFault {
 
 impl fmt::Display for EntryFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text().say(English))
+        f.write_str(&self.text().in_language(English))
     }
 }
 

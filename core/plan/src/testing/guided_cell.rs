@@ -69,30 +69,30 @@ pub struct CellSetup {
     /// Focal length \[px\] of a first view that is straight on, with the board close to the edge of the image; `None` for that
     /// of the other studies, and a first view that is tilted a little.
     pub straight: Option<f64>,
-    /// What is not as it is said to be.
-    pub untold: Untold,
+    /// What is not as it is reported to be.
+    pub untold: HiddenErrors,
     /// Seed of places and noise.
     pub seed: u64,
 }
 
 impl CellSetup {
-    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is said to be.
+    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is reported to be.
     pub fn new(arm: CellArm, mode: Mode, seed: u64) -> Self {
-        Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: Untold::NOTHING, seed }
+        Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: HiddenErrors::NOTHING, seed }
     }
 }
 
 /// What a guide is not told, and what its estimate has to find out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Untold {
+pub struct HiddenErrors {
     /// Deflection of the middle of the board against its edges along x and along y, metres.
     pub bend_m: [f64; 2],
-    /// True focal length over that of the lens which is said to be known.
+    /// True focal length over that of the lens which is reported to be known.
     pub focal: f64,
 }
 
-impl Untold {
-    /// All is as it is said to be.
+impl HiddenErrors {
+    /// All is as it is reported to be.
     pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0 };
 }
 
@@ -211,9 +211,9 @@ impl GuidedCell {
             _ => lens,
         };
         let focal = setup.untold.focal;
-        let said = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
+        let reported = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
         let (intrinsics, knowledge) =
-            if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(said)) };
+            if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(reported)) };
         Some(Self {
             setup,
             rng: ChaCha8Rng::seed_from_u64(setup.seed ^ 0x5eed),

@@ -7,7 +7,7 @@ use handeye_wording::Text;
 use handeye_wording::text;
 
 /// Why a scene cannot be used.
-#[derive(Debug, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
@@ -37,7 +37,7 @@ pub enum SceneError {
         file: String,
         /// Line, counted from 1, where known.
         line: Option<usize>,
-        /// What is wrong with the arm. It stands in the sentence, so it is no source that is said once more.
+        /// What is wrong with the arm. It stands in the sentence, so it is no source that is reported once more.
         why: Box<UrdfError>,
     },
     /// A number out of its range.

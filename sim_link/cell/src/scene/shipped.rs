@@ -170,12 +170,12 @@ mod tests {
 
     #[test]
     fn a_name_that_no_scene_has_is_answered_with_those_that_there_are() {
-        let said = |choice: &str| choice.parse::<SceneChoice>().unwrap().load().unwrap_err().to_string();
+        let reported = |choice: &str| choice.parse::<SceneChoice>().unwrap().load().unwrap_err().to_string();
         assert!(
-            said("Panda").contains("reference, realistic, coppeliasim, tracking, panda, xarm6"),
+            reported("Panda").contains("reference, realistic, coppeliasim, tracking, panda, xarm6"),
             "{}",
-            said("Panda")
+            reported("Panda")
         );
-        assert!(!said("no/such.toml").contains("panda"), "{}", said("no/such.toml"));
+        assert!(!reported("no/such.toml").contains("panda"), "{}", reported("no/such.toml"));
     }
 }

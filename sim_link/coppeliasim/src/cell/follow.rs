@@ -3,7 +3,7 @@
 //! Each point is computed here and sent for one pass of the simulation, as for a jog: the arm stands within a pass when
 //! this client hangs, dies, or loses its connection. A caller that takes longer than a pass makes the arm stand in the
 //! passes between; it still moves by one step of one pass then, because the way of several in one would be wild, and
-//! after a longer pause it starts anew from rest.
+//! after a longer pause it starts again from rest.
 
 use handeye_arm::JointValues;
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -26,7 +26,7 @@ const LONGEST_PAUSE_PASSES: f64 = 4.0;
 
 /// What the caller wants in a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FollowWish {
+pub enum FollowRequest {
     /// Towards the goal and along with it.
     Towards(FollowGoal),
     /// Come to rest, and go on following when there is a goal again.
@@ -64,7 +64,7 @@ impl Arm {
         &mut self,
         kinematics: &ArmKinematics,
         limits: &FollowLimits,
-        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+        request: &mut dyn FnMut(&FollowMoment) -> FollowRequest,
     ) -> Result<FollowEnd, LinkError> {
         limits.validate()?;
         positive([("the time step of the simulation", self.info.time_step_s)])?;
@@ -79,7 +79,7 @@ impl Arm {
         match FollowPlan::new(kinematics, &limits, guard, start, self.info.time_step_s) {
             Ok(plan) => {
                 let mut stream = Stream::begin(self, start, TASK)?;
-                let outcome = self.send_follow(plan, &mut stream, wish);
+                let outcome = self.send_follow(plan, &mut stream, request);
                 let outcome = outcome.and_then(|end| self.put_target_to_tip().map(|()| end));
                 stream.end(self, outcome)
             }
@@ -91,7 +91,7 @@ impl Arm {
         &mut self,
         mut plan: FollowPlan<'_>,
         stream: &mut Stream,
-        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+        request: &mut dyn FnMut(&FollowMoment) -> FollowRequest,
     ) -> Result<FollowEnd, LinkError> {
         let dt_s = self.info.time_step_s;
         let longest_pause_s = LONGEST_PAUSE_PASSES * dt_s;
@@ -105,21 +105,21 @@ impl Arm {
             }
             let sim_time_s = now_s + dt_s;
             let base_from_tip = plan.base_from_tip();
-            let goal = match wish(&FollowMoment {
+            let goal = match request(&FollowMoment {
                 sim_time_s,
                 joints: *plan.joints(),
                 base_from_tip,
                 is_kept_off: plan.is_kept_off(),
             }) {
                 _ if ending.is_some() => None,
-                FollowWish::Towards(goal) if goal.is_finite() => Some(goal),
-                FollowWish::Towards(_) => {
+                FollowRequest::Towards(goal) if goal.is_finite() => Some(goal),
+                FollowRequest::Towards(_) => {
                     let (expected, value) = ("a finite pose with finite velocities", f64::NAN);
                     ending = Some(Err(LinkError::BadMotion { what: "the goal", expected, value }));
                     None
                 }
-                FollowWish::Rest => None,
-                FollowWish::End => {
+                FollowRequest::Rest => None,
+                FollowRequest::End => {
                     ending = Some(Ok(FollowEnd::Released));
                     None
                 }

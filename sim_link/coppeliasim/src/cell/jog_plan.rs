@@ -54,7 +54,7 @@ const SLOWER_STEPS: usize = 6;
 const AT_END: f64 = 1e-9;
 
 /// Why a jog goes no further.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum JogObstacle {
     /// A joint is at the end of its range.

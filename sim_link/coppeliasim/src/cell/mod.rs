@@ -44,7 +44,7 @@ use handeye_geometry::camera::Intrinsics;
 pub use arm::{Arm, MotionTolerance, SettleOptions};
 pub use board::{BoardMotion, BoardPath, UnknownPath};
 pub use camera::{CameraFeed, Frame};
-pub use follow::{FollowMoment, FollowWish};
+pub use follow::{FollowMoment, FollowRequest};
 pub use follow_goal::{FollowEnd, FollowGoal, FollowLimits, Workspace};
 pub use jog::{ArmJog, JogAxes, JogEnd};
 pub use jog_plan::{
@@ -55,7 +55,7 @@ pub use joints::{CellJoint, RAD_PER_M};
 pub use paths::{BadCellPath, CellPart, CellPaths};
 pub use reach::{ArmKinematics, UnknownKinematics};
 pub use room::{BoardReach, FollowPlace, NoPlace};
-pub use surroundings::{Among, Standing};
+pub use surroundings::{Among, SceneObstacles};
 pub use truth::{GroundTruth, TRUTH_FUNCTION};
 pub use version::version_name;
 pub use views::BoardInView;

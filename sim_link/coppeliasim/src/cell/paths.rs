@@ -68,7 +68,7 @@ pub enum CellPart {
 }
 
 /// What is no assignment of a path.
-#[derive(Debug, Clone, PartialEq, Eq, Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, Error, handeye_wording::Localized)]
 pub enum BadCellPath {
     /// No part of that name.
     #[error("{0:?} is not a part of a cell: those are arm, joints, tip, target, camera, depth and board")]

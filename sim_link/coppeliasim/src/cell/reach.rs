@@ -42,7 +42,7 @@ pub struct ArmKinematics {
 }
 
 /// Why the kinematics of an arm is not known.
-#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum UnknownKinematics {
     /// Where the arm stands is not known.

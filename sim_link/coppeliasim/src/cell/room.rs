@@ -94,7 +94,7 @@ pub struct FollowPlace {
 }
 
 /// There is no place to follow from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[error(
     "of {tried} places that show the whole board none has room for the arm to follow it: move the board away from \
      the column of the arm, and not to the end of its reach"

@@ -27,14 +27,14 @@ const HAND_CLEARANCE_M: f64 = 0.01;
 
 /// What stands in a scene.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Standing {
+pub struct SceneObstacles {
     /// What does not hang on the board.
     pub around: Surroundings,
     /// What holds the board and goes where it goes: where it was when the scene was looked at.
     pub on_board: Vec<Obstacle>,
 }
 
-impl Standing {
+impl SceneObstacles {
     /// All of it, for planning about a board that stands.
     pub fn all(&self) -> Surroundings {
         self.around.clone().and(Surroundings::of(self.on_board.clone()))
@@ -94,7 +94,7 @@ impl Arm {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn surroundings(&mut self, kinematics: &ArmKinematics) -> Result<Standing, LinkError> {
+    pub fn surroundings(&mut self, kinematics: &ArmKinematics) -> Result<SceneObstacles, LinkError> {
         let held = Held::acquire(&mut self.sim)?;
         let (arm, board) = (self.objects.arm.or_else(|| self.objects.joints.first().copied()), self.objects.board);
         let found = read(&mut self.sim, arm, board, kinematics);
@@ -107,7 +107,7 @@ fn read(
     arm: Option<ObjectHandle>,
     board: Option<ObjectHandle>,
     kinematics: &ArmKinematics,
-) -> Result<Standing, LinkError> {
+) -> Result<SceneObstacles, LinkError> {
     let shapes = sim.get_shapes(None)?;
     let mut own: HashSet<ObjectHandle> = board.into_iter().collect();
     if let Some(arm) = arm {
@@ -157,17 +157,17 @@ fn read(
         boxes.truncate(MOST_BOXES);
     }
     let stands_on = boxes.iter().any(|(_, _, obstacle)| obstacle.distance_to(&below_foot) <= ABOVE_FOOT_M);
-    let mut standing = Standing::default();
+    let mut obstacles_found = SceneObstacles::default();
     if is_hollow || !stands_on {
         // Whatever the arm stands on is not among the boxes: that is then its plane.
-        standing.around = kinematics.plane();
+        obstacles_found.around = kinematics.plane();
     }
     for (_, is_on_board, obstacle) in boxes {
         if is_on_board {
-            standing.on_board.push(obstacle);
+            obstacles_found.on_board.push(obstacle);
         } else {
-            standing.around.obstacles.push(obstacle);
+            obstacles_found.around.obstacles.push(obstacle);
         }
     }
-    Ok(standing)
+    Ok(obstacles_found)
 }

@@ -328,12 +328,15 @@ fn a_scene_without_its_tip_is_named_with_the_path() {
     let world = world();
     edit(&world, |w| w.missing.push("/UR5/Tip"));
     let error = try_cell(&world).0.err().expect("no tip");
-    let said = error.to_string();
+    let reported = error.to_string();
     let LinkError::NoSuchObject { path, part, there } = error else { panic!("{error}") };
     assert_eq!((path.as_str(), part), ("/UR5/Tip", CellPart::Tip));
     // Not all of a scene with many of them.
     assert_eq!((there.len(), there[19].as_str(), there[20].as_str()), (21, "/object[20]", "and 5 more"));
-    assert!(said.contains("its dummies are /object[1], /object[2]") && said.contains("object path \"tip\""), "{said}");
+    assert!(
+        reported.contains("its dummies are /object[1], /object[2]") && reported.contains("object path \"tip\""),
+        "{reported}"
+    );
 }
 
 #[test]

@@ -16,7 +16,7 @@ const TABLE_BELOW_ARM_M: f64 = 0.0147;
 const TABLE_M: [f64; 3] = [4.0, 4.0, 0.1];
 /// Views are planned from so much nearer and farther than those that there are.
 const OTHER_DISTANCES: [f64; 2] = [0.9, 1.1];
-/// With fewer views nothing can be said about their scatter.
+/// With fewer views nothing can be reported about their scatter.
 const LEAST_VIEWS: usize = 2;
 
 /// A board that a camera on the tip looks at, as far as it is known.

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::*;
-use crate::cell::{FollowLimits, FollowWish};
+use crate::cell::{FollowLimits, FollowRequest};
 
 /// Far longer than the limits of these tests.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(20);
@@ -57,7 +57,7 @@ fn a_clock_that_hardly_goes_on_is_not_waited_for() {
 
 #[test]
 fn a_simulation_that_was_started_again_is_waited_for_from_its_start() {
-    // Time begins anew once, and the arm comes to rest after that.
+    // Time begins again once, and the arm comes to rest after that.
     let restarted = |time_s: f64| if time_s > 0.9 { 0.0 } else { time_s + 0.05 };
     let after_s = settled(restarted).expect("it comes to rest");
     assert!((0.1..0.9).contains(&after_s), "{after_s} s");
@@ -81,6 +81,6 @@ fn a_jog_and_a_following_arm_do_not_wait_for_a_clock_that_stands() {
     .expect("ranges with room");
     let tip = kinematics.tip(&cell.client.arm().joint_values().expect("angles"));
     edit(&cell.world, |w| w.base_from_tip = tip);
-    let outcome = cell.client.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| FollowWish::Rest);
+    let outcome = cell.client.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| FollowRequest::Rest);
     assert!(matches!(outcome, Err(LinkError::WaitedTooLong { task: "following", .. })), "{outcome:?}");
 }

@@ -17,7 +17,7 @@ use super::error::DriverError;
 use super::message::{Ability, Hello};
 use super::motion::move_message;
 use super::options::DriverOptions;
-use super::shared::{Burial, Inner, Progress};
+use super::shared::{DriverExit, Inner, Progress};
 use super::spec::DriverSpec;
 use super::wire::Excerpt;
 
@@ -191,15 +191,15 @@ fn ends_with_its_input(driver: Driver, options: &DriverOptions) -> Checked {
     let began = Instant::now();
     drop(driver);
     match shared.lock().burial {
-        Some(Burial::Ended { .. }) => {
+        Some(DriverExit::Ended { .. }) => {
             Ok(Found::Passed(format!("it ends {:.2} s after its input is closed", began.elapsed().as_secs_f64())))
         }
-        Some(Burial::Closed) => Ok(Found::Passed("it closes its end when the connection is closed".into())),
-        Some(Burial::Killed) | None => wrong(format!(
+        Some(DriverExit::Closed) => Ok(Found::Passed("it closes its end when the connection is closed".into())),
+        Some(DriverExit::Killed) | None => wrong(format!(
             "it does not end within {} s after its standard input is closed, which is how it hears that the workbench is gone",
             options.farewell.as_secs_f64()
         )),
-        Some(Burial::LeftOpen) => {
+        Some(DriverExit::LeftOpen) => {
             wrong("it does not close its end of a connection that was closed: it must brake and wait for the next")
         }
     }
@@ -211,14 +211,14 @@ fn ends_after_bye(spec: &DriverSpec, options: &DriverOptions, cancel: &CancelTok
     let shared = again.shared().clone();
     drop(again);
     match &shared.lock().burial {
-        Some(Burial::Ended { is_success: false, status }) => {
+        Some(DriverExit::Ended { is_success: false, status }) => {
             Ok(Found::Warning(format!("it ends after `bye`, with {status} and not with 0")))
         }
-        Some(Burial::Ended { .. }) => Ok(Found::Passed("it starts again and ends after `bye`".into())),
-        Some(Burial::Closed) => {
+        Some(DriverExit::Ended { .. }) => Ok(Found::Passed("it starts again and ends after `bye`".into())),
+        Some(DriverExit::Closed) => {
             Ok(Found::Passed("it is there for the next connection and closes it after `bye`".into()))
         }
-        Some(Burial::Killed | Burial::LeftOpen) | None => {
+        Some(DriverExit::Killed | DriverExit::LeftOpen) | None => {
             wrong(format!("it does not end within {} s after `bye`", options.farewell.as_secs_f64()))
         }
     }

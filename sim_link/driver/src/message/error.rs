@@ -6,7 +6,7 @@ use super::PROTOCOL;
 use super::hello::Ability;
 
 /// What is wrong with a message of a driver. Whoever read it adds which line it was.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Said)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, handeye_wording::Localized)]
 #[non_exhaustive]
 pub enum BadMessage {
     /// Nothing between two ends of lines.

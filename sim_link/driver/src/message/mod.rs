@@ -19,7 +19,7 @@ pub use robot::{PoseMessage, StateMessage};
 /// The version of the protocol that is spoken here.
 pub const PROTOCOL: u32 = 1;
 /// Longest text of the parser that is shown, in characters.
-const LONGEST_SAID: usize = 300;
+const LONGEST_MESSAGE: usize = 300;
 
 /// What the workbench sends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -237,23 +237,25 @@ impl FromDriver {
 }
 
 fn body<'a, T: Deserialize<'a>>(kind: &str, line: &'a str) -> Result<T, BadMessage> {
-    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: said(&error) })
+    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: reported(&error) })
 }
 
 /// What the parser says, which may repeat what a driver has sent: on one line, and in its beginning.
-fn said(error: &serde_json::Error) -> String {
+fn reported(error: &serde_json::Error) -> String {
     let one_line = |c: char| if c.is_control() { ' ' } else { c };
-    error.to_string().chars().map(one_line).take(LONGEST_SAID).collect()
+    error.to_string().chars().map(one_line).take(LONGEST_MESSAGE).collect()
 }
 
 fn not_a_message(line: &str, error: &serde_json::Error) -> BadMessage {
     if error.is_data() {
-        BadMessage::Field { kind: "message".to_owned(), why: said(error) }
+        BadMessage::Field { kind: "message".to_owned(), why: reported(error) }
     } else if line.contains("NaN") || line.contains("Infinity") {
         // What Python writes for numbers that are none.
-        BadMessage::NotJson { why: format!("{}: JSON has no NaN and no Infinity, leave the field out", said(error)) }
+        BadMessage::NotJson {
+            why: format!("{}: JSON has no NaN and no Infinity, leave the field out", reported(error)),
+        }
     } else {
-        BadMessage::NotJson { why: said(error) }
+        BadMessage::NotJson { why: reported(error) }
     }
 }
 

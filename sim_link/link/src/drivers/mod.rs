@@ -69,9 +69,9 @@ impl Cell for DrivenCell {
     fn camera(&self, shutdown: &CancelToken) -> Result<Connected<Box<dyn CameraPort>>, PortError> {
         let cell = self.cell(shutdown)?;
         if cell.camera().is_none() {
-            let said =
+            let reported =
                 text!("The driver has no images: name a driver for the camera under Connect, beside that of the robot");
-            return Err(PortError::Hopeless(said));
+            return Err(PortError::Hopeless(reported));
         }
         let port = DriverCamera::new(cell.clone(), self.is_freehand().then(|| self.typed.clone()), shutdown.clone());
         Ok(self.connected(Box::new(port), &cell))

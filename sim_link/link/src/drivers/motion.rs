@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::CancelToken;
-use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowEnd, FollowMoment, FollowWish};
+use handeye_coppeliasim::cell::{ArmKinematics, BoardInView, FollowEnd, FollowMoment, FollowRequest};
 use handeye_driver::message::Ability;
 use handeye_driver::{ChainPlacement, Driver, DriverCell, DriverError, Goal, MoveEnd, Reading};
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -258,7 +258,7 @@ impl MotionPort for DriverMotion {
 
     fn follow(
         &mut self,
-        _wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+        _wish: &mut dyn FnMut(&FollowMoment) -> FollowRequest,
     ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
         Ok(Err(MotionOutcome::Refused(cannot_follow())))
     }

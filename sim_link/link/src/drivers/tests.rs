@@ -133,7 +133,7 @@ fn an_arm_whose_flange_is_reported_beside_its_tip_is_planned_for_and_keeps_out_o
     for goal in [goal, MotionGoal::Tip(arm.tip(&there))] {
         let refused = motion.move_to(&goal, 0.5, &shutdown).expect("connected");
         let MotionOutcome::Refused(why) = &refused else { panic!("{refused:?}") };
-        assert!(why.say(English).contains("wall"), "{why:?}");
+        assert!(why.in_language(English).contains("wall"), "{why:?}");
     }
     assert!(motion.keep_out(&Surroundings::default()).is_ok());
     assert_eq!(motion.move_to(&goal, 0.5, &shutdown), Ok(MotionOutcome::Arrived));
@@ -164,7 +164,10 @@ fn an_arm_that_takes_joint_values_alone_is_jogged_along_axes_and_goes_to_poses_b
     assert!(off_m < 2e-4 && off_rad < 1e-3, "{off_m} m, {off_rad} rad");
     let far = Pose::from_translation_xyzw([9.0, 0.0, 0.3], [0.0, 1.0, 0.0, 0.0]);
     let refused = motion.move_to(&MotionGoal::Tip(far), 0.5, &shutdown).expect("connected");
-    assert!(matches!(&refused, MotionOutcome::Refused(why) if why.say(English).contains("reach")), "{refused:?}");
+    assert!(
+        matches!(&refused, MotionOutcome::Refused(why) if why.in_language(English).contains("reach")),
+        "{refused:?}"
+    );
 }
 
 /// A driver in a few lines: it greets, answers pings, and sends images where it has some, and no states.
@@ -212,7 +215,7 @@ fn an_image_without_a_state_around_it_says_what_its_driver_owes_and_not_what_a_p
     let mut camera = connector.camera(&shutdown).expect("connected").port;
     let frame = image(camera.as_mut(), None);
     assert_eq!(frame.base_from_tip, None);
-    let why = frame.no_pose.expect("a reason").say(English);
+    let why = frame.no_pose.expect("a reason").in_language(English);
     assert!(why.contains("has not sent a state") && !why.contains("pendant"), "{why}");
 }
 
@@ -227,7 +230,7 @@ fn freehand_a_person_types_where_the_robot_is() {
     let mut camera = connector.camera(&shutdown).expect("connected").port;
     let frame = image(camera.as_mut(), None);
     assert_eq!(frame.base_from_tip, None, "nobody has said where the robot is");
-    assert!(frame.no_pose.is_some_and(|why| why.say(English).contains("pendant")));
+    assert!(frame.no_pose.is_some_and(|why| why.in_language(English).contains("pendant")));
     let pose = Pose::from_translation_xyzw([0.4, -0.1, 0.3], [0.0, 1.0, 0.0, 0.0]);
     control.type_pose(Some(pose)).expect("taken");
     assert_eq!(control.state().expect("connected").map(|state| state.base_from_tip), Some(pose));
@@ -246,7 +249,7 @@ fn a_driver_without_images_says_what_is_missing_and_one_that_is_not_there_is_tri
     assert!(matches!(nobody.control(&shutdown), Err(PortError::Later { .. })));
     nobody.rest();
     let Err(PortError::Rests(why)) = nobody.control(&shutdown) else { panic!("it is tried on") };
-    assert!(why.say(English).contains("no driver listens"), "{why:?}");
+    assert!(why.in_language(English).contains("no driver listens"), "{why:?}");
     nobody.again();
     assert!(matches!(nobody.control(&shutdown), Err(PortError::Later { .. })));
     let no_program = connector(Some("no-such-program-anywhere --x".to_owned()), None);

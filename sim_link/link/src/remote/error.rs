@@ -84,10 +84,10 @@ mod tests {
         let silent = LinkError::OwnCellSilent { call: call(), after: Duration::from_secs(30) };
         for (error, says) in [(ended, "is started again"), (silent, "for 30 s: this computer has too much to do")] {
             let PortError::Lost(why) = port_error(error) else { panic!("it is connected to again") };
-            let said = why.say(English);
-            assert!(said.contains(says) && !said.contains("Start it"), "{said}");
+            let reported = why.in_language(English);
+            assert!(reported.contains(says) && !reported.contains("Start it"), "{reported}");
         }
         let PortError::Lost(other) = port_error(LinkError::Disconnected { call: call() }) else { panic!("it is lost") };
-        assert!(other.say(English).contains("Start it again if it has ended"));
+        assert!(other.in_language(English).contains("Start it again if it has ended"));
     }
 }

@@ -2,8 +2,8 @@
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::cell::{
-    Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowWish, JogAxes, JogEnd,
-    JogObstacle, MotionTolerance, SettleOptions, Standing, UnknownKinematics,
+    Among, Arm, ArmJog, ArmKinematics, BoardInView, FollowEnd, FollowLimits, FollowMoment, FollowRequest, JogAxes,
+    JogEnd, JogObstacle, MotionTolerance, SceneObstacles, SettleOptions, UnknownKinematics,
 };
 use handeye_coppeliasim::{CallOptions, CancelToken, LinkError, SimulationState};
 use handeye_dataset::taught_poses;
@@ -26,7 +26,7 @@ pub(crate) struct RemoteMotion {
     arm: Arm,
     kinematics: Result<ArmKinematics, UnknownKinematics>,
     /// What the cell says stands around, as it was when the connection was made.
-    standing: Standing,
+    obstacles_found: SceneObstacles,
     /// All of it with what a person keeps the arm out of, and with what holds the board: plans are for one that stands.
     around: Surroundings,
     /// The arm among all of it that does not go along with the board.
@@ -39,15 +39,21 @@ impl RemoteMotion {
     /// Over an arm whose kinematics is looked at once.
     pub fn new(mut arm: Arm) -> Result<Self, LinkError> {
         let kinematics = arm.kinematics()?;
-        let standing = match &kinematics {
+        let obstacles_found = match &kinematics {
             Ok(kinematics) => arm.surroundings(kinematics)?,
             Err(why) => {
                 tracing::warn!(%why, "the kinematics of the arm is not known: goals are not checked beforehand");
-                Standing::default()
+                SceneObstacles::default()
             }
         };
-        let mut live =
-            Self { arm, kinematics, standing, around: Surroundings::default(), among: None, limits: limits::SEQUENCE };
+        let mut live = Self {
+            arm,
+            kinematics,
+            obstacles_found,
+            around: Surroundings::default(),
+            among: None,
+            limits: limits::SEQUENCE,
+        };
         live.keep_to(&Surroundings::default());
         Ok(live)
     }
@@ -55,8 +61,8 @@ impl RemoteMotion {
     /// From the next motion on: to what stands around and to what a person keeps it out of.
     fn keep_to(&mut self, keep_out: &Surroundings) {
         let Ok(kinematics) = &self.kinematics else { return };
-        self.around = self.standing.all().and(keep_out.clone());
-        self.among = Some(kinematics.among(self.standing.around.clone().and(keep_out.clone()), None));
+        self.around = self.obstacles_found.all().and(keep_out.clone());
+        self.among = Some(kinematics.among(self.obstacles_found.around.clone().and(keep_out.clone()), None));
         self.arm.keep_clear(self.among.clone());
     }
 
@@ -191,7 +197,7 @@ impl MotionPort for RemoteMotion {
             Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),
             Ok(Err(why)) => Ok(Some(why)),
             Err(error) if is_lost(&error) => Err(port_error(error)),
-            Err(error) => Ok(Some(said(&error))),
+            Err(error) => Ok(Some(reported(&error))),
         }
     }
 
@@ -235,14 +241,14 @@ impl MotionPort for RemoteMotion {
     fn keep_out(&mut self, keep_out: &Surroundings) -> Result<Surroundings, Text> {
         self.keep_to(keep_out);
         match &self.kinematics {
-            Ok(_known) => Ok(self.standing.all()),
+            Ok(_known) => Ok(self.obstacles_found.all()),
             Err(why) => Err(text!("The kinematics of the arm is not known: {why}", why = why)),
         }
     }
 
     fn follow(
         &mut self,
-        wish: &mut dyn FnMut(&FollowMoment) -> FollowWish,
+        requested: &mut dyn FnMut(&FollowMoment) -> FollowRequest,
     ) -> Result<Result<FollowEnd, MotionOutcome>, PortError> {
         let kinematics = match &self.kinematics {
             Ok(kinematics) => kinematics,
@@ -253,7 +259,7 @@ impl MotionPort for RemoteMotion {
                 ))));
             }
         };
-        match self.arm.follow(kinematics, &FollowLimits::default(), wish) {
+        match self.arm.follow(kinematics, &FollowLimits::default(), requested) {
             Ok(end) => Ok(Ok(end)),
             Err(error) => outcome_of(error, &CancelToken::default()).map(Err),
         }
@@ -315,21 +321,21 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
         LinkError::MotionStopped { .. } => Ok(MotionOutcome::Stopped),
         LinkError::Cancelled { .. } if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
         error if is_lost(&error) => Err(port_error(error)),
-        error @ LinkError::Unreached { .. } => Ok(MotionOutcome::Unreached(said(&error))),
-        error @ LinkError::Held { .. } => Ok(MotionOutcome::Held(said(&error))),
+        error @ LinkError::Unreached { .. } => Ok(MotionOutcome::Unreached(reported(&error))),
+        error @ LinkError::Held { .. } => Ok(MotionOutcome::Held(reported(&error))),
         // These are found out before anything moves.
         error @ (LinkError::JointOutOfRange { .. }
         | LinkError::JointCount { .. }
         | LinkError::InTheWay { .. }
         | LinkError::BadMotion { .. }
         | LinkError::NoSuchObject { .. }
-        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(said(&error))),
-        error => Ok(MotionOutcome::Failed(said(&error))),
+        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(reported(&error))),
+        error => Ok(MotionOutcome::Failed(reported(&error))),
     }
 }
 
 /// What a person does about it, in the language of the window; what is rare stays in the words of the client.
-fn said(error: &LinkError) -> Text {
+fn reported(error: &LinkError) -> Text {
     match error {
         LinkError::NotRunning { state: SimulationState::Paused, .. } => {
             text!("The simulation is paused: continue it first")

@@ -156,7 +156,7 @@ impl Plan for PosePlan {
 
 impl ArmIk {
     /// Puts the target to a pose in the world, and the joints to where the tip meets it. If there is no such place
-    /// nearby, the joints stay where they are and nothing is said, as the simulator has it.
+    /// nearby, the joints stay where they are and nothing is reported, as the simulator has it.
     fn follow(&self, cell: &mut Cell, world_from_goal: &Isometry3<f64>) -> Result<(), ApiError> {
         cell.world.tree.set_world_pose(self.target, world_from_goal)?;
         let tree = &cell.world.tree;

@@ -58,9 +58,9 @@ impl Bench {
     /// Takes what the engine has said. Clients that are asked to wait say that they do, as all of the vendor's do; `true`
     /// if there were any.
     fn listen(&mut self) -> bool {
-        let (asked, said): (Vec<_>, Vec<_>) =
+        let (asked, reported): (Vec<_>, Vec<_>) =
             self.engine.take_outgoing().into_iter().partition(|(_, bytes)| *bytes == message::wait());
-        self.replies.extend(said);
+        self.replies.extend(reported);
         self.waits += asked.len();
         for (to, _) in &asked {
             let uuid = self.engine.clients.connection_mut(to).map(|c| c.uuid.clone()).unwrap_or_default();

@@ -22,7 +22,7 @@ pub enum Incoming {
 
 /// Why a connection has ended.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Gone {
+pub enum CloseReason {
     /// The other side closed it.
     #[error("the other side closed it")]
     Closed,
@@ -122,8 +122,8 @@ impl Connection {
     /// no further.
     ///
     /// # Errors
-    /// [`Gone`], when there will be no more.
-    pub fn next_request(&mut self, scratch: &mut [u8], now: Duration) -> Result<Option<Incoming>, Gone> {
+    /// [`CloseReason`], when there will be no more.
+    pub fn next_request(&mut self, scratch: &mut [u8], now: Duration) -> Result<Option<Incoming>, CloseReason> {
         while self.has_work() {
             if self.read == self.inbox.len() && !self.receive(scratch, now)? {
                 return Ok(None);
@@ -148,10 +148,10 @@ impl Connection {
     }
 
     /// Takes what the system has; `false` when it has nothing.
-    fn receive(&mut self, scratch: &mut [u8], now: Duration) -> Result<bool, Gone> {
+    fn receive(&mut self, scratch: &mut [u8], now: Duration) -> Result<bool, CloseReason> {
         loop {
             match self.stream.read(scratch) {
-                Ok(0) => return Err(Gone::Closed),
+                Ok(0) => return Err(CloseReason::Closed),
                 Ok(count) => {
                     self.inbox = scratch[..count].to_vec();
                     self.hear(now);
@@ -162,7 +162,7 @@ impl Connection {
                     self.may_read = false;
                     return Ok(false);
                 }
-                Err(error) => return Err(Gone::Broken(error.kind())),
+                Err(error) => return Err(CloseReason::Broken(error.kind())),
             }
         }
     }
@@ -174,8 +174,8 @@ impl Connection {
     /// Sends a reply, as far as the other side takes it now, and keeps the rest.
     ///
     /// # Errors
-    /// [`Gone`].
-    pub fn send(&mut self, reply: Vec<u8>, now: Duration) -> Result<(), Gone> {
+    /// [`CloseReason`].
+    pub fn send(&mut self, reply: Vec<u8>, now: Duration) -> Result<(), CloseReason> {
         let head = zmtp::reply_head(reply.len());
         self.post(&head, reply, now);
         self.flush()
@@ -188,17 +188,17 @@ impl Connection {
     /// Sends what waits, as far as the other side takes it now.
     ///
     /// # Errors
-    /// [`Gone`].
-    pub fn flush(&mut self) -> Result<(), Gone> {
+    /// [`CloseReason`].
+    pub fn flush(&mut self) -> Result<(), CloseReason> {
         while self.may_write
             && let Some(parcel) = self.outbox.front_mut()
         {
             match self.stream.write_vectored(&parcel.rest()) {
-                Ok(0) => return Err(Gone::Closed),
+                Ok(0) => return Err(CloseReason::Closed),
                 Ok(count) => parcel.sent += count,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => self.may_write = false,
-                Err(error) => return Err(Gone::Broken(error.kind())),
+                Err(error) => return Err(CloseReason::Broken(error.kind())),
             }
             if parcel.is_sent() {
                 self.outbox.pop_front();
@@ -210,8 +210,8 @@ impl Connection {
     /// Goes on sending after the system said that it can. That there is room again is a sign of life: somebody reads.
     ///
     /// # Errors
-    /// [`Gone`].
-    pub fn resume(&mut self, now: Duration) -> Result<(), Gone> {
+    /// [`CloseReason`].
+    pub fn resume(&mut self, now: Duration) -> Result<(), CloseReason> {
         if self.may_write && !self.outbox.is_empty() {
             self.hear(now);
             self.flush()?;
@@ -243,16 +243,16 @@ impl Connection {
     /// Asks a silent client for a sign of life, and gives up one that gives none.
     ///
     /// # Errors
-    /// [`Gone`].
-    pub fn look_after(&mut self, now: Duration) -> Result<(), Gone> {
+    /// [`CloseReason`].
+    pub fn look_after(&mut self, now: Duration) -> Result<(), CloseReason> {
         if self.due().is_none_or(|due| now < due) {
             return Ok(());
         }
         if !self.decoder.is_ready() {
-            return Err(Gone::NoIntroduction);
+            return Err(CloseReason::NoIntroduction);
         }
         if self.pinged.is_some() {
-            return Err(Gone::Silent);
+            return Err(CloseReason::Silent);
         }
         self.pinged = Some(now);
         self.post(&zmtp::PING, Vec::new(), now);

@@ -54,7 +54,7 @@ impl Pair {
     }
 
     /// One turn of the loop, in which the system says that everything can go on.
-    fn turn(&mut self, now: Duration) -> Result<Option<Incoming>, Gone> {
+    fn turn(&mut self, now: Duration) -> Result<Option<Incoming>, CloseReason> {
         (self.here.may_read, self.here.may_write) = (true, true);
         self.here.resume(now)?;
         self.here.flush()?;
@@ -82,7 +82,7 @@ fn whoever_does_not_introduce_itself_is_let_go() {
     assert_eq!(pair.turn(after(9)), Ok(None));
     assert_eq!(pair.here.look_after(after(9)), Ok(()));
     assert_eq!(pair.here.due(), Some(after(10)));
-    assert_eq!(pair.here.look_after(after(10)), Err(Gone::NoIntroduction));
+    assert_eq!(pair.here.look_after(after(10)), Err(CloseReason::NoIntroduction));
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn a_silent_client_is_asked_for_a_sign_of_life_and_then_given_up() {
     assert_eq!(pair.here.look_after(after(20)), Ok(()));
     assert_eq!(pair.hear(zmtp::PING.len()), zmtp::PING);
     assert_eq!(pair.here.look_after(after(34)), Ok(()));
-    assert_eq!(pair.here.look_after(after(35)), Err(Gone::Silent));
+    assert_eq!(pair.here.look_after(after(35)), Err(CloseReason::Silent));
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn a_reply_that_trickles_out_is_a_sign_of_life() {
     }
     assert_eq!(pair.here.look_after(after(21)), Ok(()));
     assert_eq!(pair.here.look_after(after(25)), Ok(()));
-    assert_eq!(pair.here.look_after(after(40)), Err(Gone::Silent), "and then nobody");
+    assert_eq!(pair.here.look_after(after(40)), Err(CloseReason::Silent), "and then nobody");
 }
 
 #[test]

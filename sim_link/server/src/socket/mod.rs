@@ -19,7 +19,7 @@ use super::CellError;
 use super::clients::Peer;
 use super::engine::{Due, Engine};
 use super::message::BadRequest;
-use connection::{Connection, Gone, Incoming};
+use connection::{CloseReason, Connection, Incoming};
 
 /// Connections at a time; a workbench has three.
 const MAX_CONNECTIONS: usize = 256;
@@ -212,7 +212,7 @@ impl Loop {
         while self.connections.values().map(Connection::held_bytes).sum::<usize>() > BUDGET_BYTES {
             let waiting = |(token, connection): (&Token, &Connection)| Some((connection.waiting_since()?, *token));
             let Some((_since, slowest)) = self.connections.iter().filter_map(waiting).min() else { return };
-            self.close(slowest, &Gone::Slowest);
+            self.close(slowest, &CloseReason::Slowest);
         }
     }
 
@@ -227,20 +227,22 @@ impl Loop {
         }
     }
 
-    fn close_if(&mut self, token: Token, outcome: Result<(), Gone>) {
+    fn close_if(&mut self, token: Token, outcome: Result<(), CloseReason>) {
         if let Err(gone) = outcome {
             self.close(token, &gone);
         }
     }
 
-    fn close(&mut self, token: Token, why: &Gone) {
+    fn close(&mut self, token: Token, why: &CloseReason) {
         if self.connections.remove(&token).is_none() {
             return;
         }
         match why {
-            Gone::Closed | Gone::Broken(_) => tracing::debug!(%why, "a connection has ended"),
-            Gone::Slowest => tracing::warn!(%why, "a connection is closed"),
-            Gone::Violation(_) | Gone::NoIntroduction | Gone::Silent => tracing::info!(%why, "a connection is closed"),
+            CloseReason::Closed | CloseReason::Broken(_) => tracing::debug!(%why, "a connection has ended"),
+            CloseReason::Slowest => tracing::warn!(%why, "a connection is closed"),
+            CloseReason::Violation(_) | CloseReason::NoIntroduction | CloseReason::Silent => {
+                tracing::info!(%why, "a connection is closed")
+            }
         }
         self.engine.disconnected(&peer(token), self.started.elapsed());
     }

@@ -5,12 +5,12 @@ mod cases;
 #[path = "../../../studies/doctor_cases/faults.rs"]
 mod faults;
 
-use handeye_estimate::claim::{Alternative, Claim};
 use handeye_estimate::diagnose::doctor::diagnose;
 use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions, Severity};
 use handeye_estimate::diagnose::{Calibration, calibrate, calibrate_with, examine};
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::closed_form;
+use handeye_estimate::stated_uncertainty::{Alternative, StatedUncertainty};
 use handeye_estimate::{Fit, Method, Observations, Options, TargetSize, ViewStatus, fit};
 use handeye_geometry::frames::Pose;
 use handeye_geometry::observations::Noise;
@@ -18,7 +18,7 @@ use handeye_geometry::planar_pose;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::testing::GRID;
 use handeye_plan::guided::GuidedOptions;
-use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, Untold};
+use handeye_plan::testing::guided_cell::{CellArm, CellSetup, GuidedCell, HiddenErrors};
 use handeye_result::CalibrationResult;
 use handeye_simulate::session::{ArmError, Cone, Fault, Setup, camera, links, observed};
 use handeye_wording::Catalogue;
@@ -41,9 +41,9 @@ fn every_degenerate_or_hostile_session_gets_its_code_and_none_is_called_healthy(
 
 /// Leaves of every template its values alone.
 #[derive(Clone, Copy)]
-struct Wordless;
+struct ValuesOnly;
 
-impl Catalogue for Wordless {
+impl Catalogue for ValuesOnly {
     fn translation(self, english: &str) -> Option<&'static str> {
         let values = english.split('{').skip(1).filter_map(|part| part.split_once('}'));
         let values = values.filter(|(name, _)| !name.contains('|'));
@@ -189,8 +189,8 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
             let (calibration, diagnosis) =
                 examined(&observed(&fine.clone().with(Fault { warp_m, scale, ..Fault::default() })));
             let size = calibration.joint.as_ref().and_then(|joint| joint.size.clone()).expect("the robot moved");
-            let said = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale);
-            if let Some(estimate) = said.and_then(|h| h.estimate) {
+            let reported = diagnosis.hypotheses.iter().find(|h| h.code == FindingCode::WrongScale);
+            if let Some(estimate) = reported.and_then(|h| h.estimate) {
                 told_of_size += 1;
                 // But for the rounding of a difference to one.
                 let apart = |a: f64, b: f64| (a - b).abs() / b;
@@ -198,13 +198,13 @@ fn a_report_has_one_size_of_the_target_and_on_a_bent_board_it_sets_no_headline()
                 assert!(estimate.sigma.is_some_and(|sigma| apart(sigma, size.sigma) < 1e-9), "{mode:?} {seed}");
             }
             let is_accused = diagnosis.findings.iter().any(|finding| finding.code == FindingCode::WrongScale);
-            assert_eq!(is_accused, scale > 0.0, "{mode:?} {seed}: {size:?} {said:?}");
+            assert_eq!(is_accused, scale > 0.0, "{mode:?} {seed}: {size:?} {reported:?}");
             assert!((size.scale - 1.0 - scale).abs() < 5.0 * size.sigma + 1e-4, "{mode:?} {seed}: {size:?}");
             // Of a size that is wrong and not in the answer the error counts how far it moves it. Where the lens is estimated on a
             // bent board something else may be found beside it.
             let is_moved = calibration.moved_m().is_some();
             let right = if estimated { is_moved || scale == 0.0 } else { is_moved == (scale > 0.0) };
-            assert!(right, "{mode:?} {seed}: {:?}", calibration.claim());
+            assert!(right, "{mode:?} {seed}: {:?}", calibration.stated_uncertainty());
         }
     }
     assert!(told_of_size >= 6, "nothing is compared: {told_of_size}");
@@ -242,7 +242,7 @@ fn where_the_field_of_the_robot_leaves_the_size_open_the_stated_error_counts_wha
 #[test]
 fn the_error_beside_a_lens_that_was_given_wrongly_is_that_of_the_answer() {
     for seed in 1000..1006 {
-        let untold = Untold { focal: 0.99, ..Untold::NOTHING };
+        let untold = HiddenErrors { focal: 0.99, ..HiddenErrors::NOTHING };
         let (arm, mode) = (CellArm::ALL[seed as usize % 3], Mode::EyeInHand);
         let setup = CellSetup { untold, ..CellSetup::new(arm, mode, seed) };
         let options = GuidedOptions { goal_m: 5e-4, candidates: 300, most_views: 18, ..GuidedOptions::default() };
@@ -343,7 +343,7 @@ fn the_stated_error_covers_the_true_one_when_what_was_given_is_wrong() {
             let joint = calibration.joint.as_ref().expect("a joint estimate");
             let by_size_m = joint.open_size().map_or(0.0, |size| {
                 let covariance = calibration.hand_eye_covariance().expect("stated");
-                let open = Claim::Moved(vec![size.with.clone()]);
+                let open = StatedUncertainty::Moved(vec![size.with.clone()]);
                 open.error_95_m(covariance, joint.small_sample, &point).expect("stated")
             });
             let widest_m = (2.0 * error_m + 1.5 * modelled_m).max(by_size_m);
@@ -416,7 +416,7 @@ fn a_unit_that_was_stated_wrongly_is_named() {
         let named = findings.iter().find(|f| f.code == FindingCode::WrongAngleUnit).expect("the unit is named");
         assert!(named.to_string().contains("are in radians where degrees were stated"), "{named}");
     }
-    for (times, said) in [
+    for (times, reported) in [
         (1e3, "in millimetres where metres"),
         (1e-3, "in metres where millimetres"),
         (10.0, "is 0.1 times the true one, a power of ten"),
@@ -430,7 +430,7 @@ fn a_unit_that_was_stated_wrongly_is_named() {
         };
         let findings = found(&changed(&scaled));
         let named = findings.iter().find(|f| f.code == FindingCode::WrongLengthUnit).expect("the unit is named");
-        assert!(named.to_string().contains(said), "{times}: {named}");
+        assert!(named.to_string().contains(reported), "{times}: {named}");
     }
 }
 
@@ -490,7 +490,7 @@ mod slow {
             let diagnosis = faults::examined(&observations);
             let of_hypotheses = diagnosis.hypotheses.iter().flat_map(|h| [&h.text, &h.advice]);
             for text in diagnosis.findings.iter().map(|finding| &finding.text).chain(of_hypotheses) {
-                let values = text.say(Wordless);
+                let values = text.in_language(ValuesOnly);
                 let is_prose = |word: &str| word.len() > 3 && !closed_forms.contains(&word);
                 let prose: Vec<&str> =
                     values.split(|c: char| !c.is_alphabetic() && c != '_').filter(|word| is_prose(word)).collect();

@@ -35,10 +35,10 @@ fn a_given_lens_whose_centre_is_half_a_pixel_off_is_named_and_counted() {
             let (calibration, diagnosis) = examined(&session.given([0.5, 0.5]));
             let finding = named(&diagnosis, FindingCode::WrongIntrinsics).expect("it is named");
             assert_eq!(finding.severity, Severity::Warning);
-            let said = finding.to_string();
-            assert!(said.contains("half a pixel"), "{mode:?} {seed}: {said}");
+            let reported = finding.to_string();
+            assert!(reported.contains("half a pixel"), "{mode:?} {seed}: {reported}");
             let right = format!("cx = {:.2} and cy = {:.2}", session.lens.cx, session.lens.cy);
-            assert!(said.contains(&right), "{mode:?} {seed}: {said}, not {right}");
+            assert!(reported.contains(&right), "{mode:?} {seed}: {reported}, not {right}");
             let (error_m, stated_m) = session.errors_m(&calibration).expect("answered");
             let stated_m = stated_m.expect("one cause explains it");
             assert!(error_m > 3e-4, "{mode:?} {seed}: the lens changes nothing: nothing is asserted");
@@ -56,13 +56,13 @@ fn half_a_pixel_is_named_where_another_centre_would_not_be() {
     let mut found = 0;
     for seed in 0..4 {
         let session = Scene { corner_px: 0.03, ..Scene::new(Mode::EyeInHand, 12) }.draw(seed);
-        let said = |off: f64| {
+        let reported = |off: f64| {
             let (_, diagnosis) = examined(&session.given([off; 2]));
             named(&diagnosis, FindingCode::WrongIntrinsics).map(ToString::to_string)
         };
         let off = if seed % 2 == 0 { 0.5 } else { -0.5 };
-        found += usize::from(said(off).is_some_and(|said| said.contains("half a pixel")));
-        assert_eq!(said(0.0), None, "{seed}");
+        found += usize::from(reported(off).is_some_and(|reported| reported.contains("half a pixel")));
+        assert_eq!(reported(0.0), None, "{seed}");
     }
     assert!(found >= 2, "in {found} of 4");
 }

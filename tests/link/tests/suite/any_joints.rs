@@ -7,7 +7,7 @@ use std::time::Duration;
 use handeye_arm::{JointKind, JointValues};
 use handeye_cell::scene::Scene;
 use handeye_coppeliasim::cell::{
-    Arm, ArmJog, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowWish, JogAxes, JogEnd, JogObstacle,
+    Arm, ArmJog, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowRequest, JogAxes, JogEnd, JogObstacle,
     MotionTolerance,
 };
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, LinkError, MotionLimits};
@@ -185,7 +185,7 @@ fn follow(bench: &mut Bench, limits: &FollowLimits) -> f64 {
             let here = at(now_s - time_step_s).base_from_tip;
             worst_m = worst_m.max(moment.base_from_tip.distance_to(&here).0);
         }
-        if now_s - begin_s > 8.0 { FollowWish::End } else { FollowWish::Towards(at(now_s)) }
+        if now_s - begin_s > 8.0 { FollowRequest::End } else { FollowRequest::Towards(at(now_s)) }
     });
     assert_eq!(end, Ok(FollowEnd::Released));
     worst_m

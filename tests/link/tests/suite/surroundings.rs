@@ -17,21 +17,21 @@ fn realistic() -> Bench {
 fn the_shapes_of_the_scene_stand_around_but_not_the_arm_and_not_the_board() {
     let mut bench = realistic();
     let kinematics = bench.kinematics();
-    let standing = bench.arm.surroundings(&kinematics).expect("calls");
+    let obstacles_found = bench.arm.surroundings(&kinematics).expect("calls");
     let names = |boxes: &[Obstacle]| boxes.iter().map(|it| it.name.clone()).collect::<Vec<_>>();
-    let around = names(&standing.around.obstacles);
+    let around = names(&obstacles_found.around.obstacles);
     for name in ["Table", "Floor", "Post", "MountingPlate", "Wall"] {
         assert!(around.iter().any(|known| known == name), "{name} is not among {around:?}");
     }
     for name in ["UR5", "link", "Gripper", "Plane"] {
         assert!(!around.iter().any(|known| known == name), "{name} is among {around:?}");
     }
-    let mut on_board = names(&standing.on_board);
+    let mut on_board = names(&obstacles_found.on_board);
     on_board.sort();
     assert_eq!(on_board, ["Panel", "Stand"]);
-    assert_eq!(standing.all().obstacles.len(), around.len() + 2);
+    assert_eq!(obstacles_found.all().obstacles.len(), around.len() + 2);
     // As the scene has it.
-    let table = standing.around.obstacles.iter().find(|it| it.name == "Table").expect("it was found");
+    let table = obstacles_found.around.obstacles.iter().find(|it| it.name == "Table").expect("it was found");
     let truth = bench.truth.solids.iter().find(|it| it.name == "table").expect("it is there");
     for axis in 0..3 {
         assert!((table.size_m[axis] - truth.size_m[axis]).abs() < 1e-9);
@@ -47,8 +47,8 @@ fn a_box_that_the_foot_of_the_arm_stands_in_is_hollow_and_one_out_of_reach_does_
                 position_m = [0.6, 0, 0.1]\n";
     let mut bench = Bench::start(Scene::from_toml(text).expect("valid"));
     let kinematics = bench.kinematics();
-    let standing = bench.arm.surroundings(&kinematics).expect("calls");
-    let names: Vec<&str> = standing.around.obstacles.iter().map(|it| it.name.as_str()).collect();
+    let obstacles_found = bench.arm.surroundings(&kinematics).expect("calls");
+    let names: Vec<&str> = obstacles_found.around.obstacles.iter().map(|it| it.name.as_str()).collect();
     // What the arm stands on may be within the cage.
     assert_eq!(names, ["plane under the arm", "Near"]);
 }

@@ -1,7 +1,7 @@
 //! The vendor's own servers, replayed: what they answered to this very client, byte by byte.
 //!
 //! `tests/data/coppeliasim-VERSION.txt` is a conversation with the remote API server of that version in front of the
-//! built-in cell: a line for each message with `R`eceived or `S`ent by the server, and the bytes. It is made anew by
+//! built-in cell: a line for each message with `R`eceived or `S`ent by the server, and the bytes. It is made again by
 //! running the ignored test with `HANDEYE_VENDOR_SERVER` naming a server whose simulation runs, and `HANDEYE_VENDOR_VERSION` its
 //! version. The client's ids come from a seed, so it sends the same requests in the replay, or the test fails.
 

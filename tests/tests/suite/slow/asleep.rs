@@ -11,7 +11,7 @@ use handeye_coppeliasim::cell::{Arm, CellPaths};
 use handeye_result::CalibrationResult;
 use handeye_server::{CellConfig, CellServer};
 use handeye_session::Session;
-use handeye_tests::process::{end_of, put_to_sleep, signal, start, until_said};
+use handeye_tests::process::{end_of, put_to_sleep, signal, start, until_message};
 
 /// Longer than anything that is waited for takes on a busy machine.
 const PATIENCE: Duration = Duration::from_mins(4);
@@ -21,9 +21,9 @@ fn auto(out: &Path, arguments: &[&str]) -> (Child, BufReader<ChildStderr>) {
     start(&[&["auto", "--rerun", "off", "--out", &out], arguments].concat())
 }
 
-fn check(mut child: Child, mut said: BufReader<ChildStderr>, out: &Path) -> String {
+fn check(mut child: Child, mut reported: BufReader<ChildStderr>, out: &Path) -> String {
     let mut rest = String::new();
-    said.read_to_string(&mut rest).expect("text");
+    reported.read_to_string(&mut rest).expect("text");
     assert!(end_of(&mut child).success(), "{rest}");
     let session = Session::open(out).expect("a session");
     assert_eq!(session.document.captures.len(), 10, "{rest}");
@@ -46,8 +46,8 @@ fn a_sequence_goes_on_when_the_cell_has_forgotten_the_sleeper() {
     let mut witness =
         Arm::connect(&endpoint.parse().expect("an address"), &options, &CellPaths::default()).expect("it answers");
 
-    let (child, mut said) = auto(&out, &["--connect", &endpoint]);
-    until_said(&mut said, "pose 2 of 10 captured");
+    let (child, mut reported) = auto(&out, &["--connect", &endpoint]);
+    until_message(&mut reported, "pose 2 of 10 captured");
     let (at, deadline) = (witness.joint_values().expect("an answer"), Instant::now() + PATIENCE);
     while witness.joint_values().expect("an answer") == at {
         assert!(Instant::now() < deadline, "the arm does not move");
@@ -59,7 +59,7 @@ fn a_sequence_goes_on_when_the_cell_has_forgotten_the_sleeper() {
         assert!(Instant::now() < deadline, "the sleeper is waited for without end");
     }
     signal(&child, "CONT");
-    let rest = check(child, said, &out);
+    let rest = check(child, reported, &out);
     assert!(rest.contains("asleep"), "it says what happened: {rest}");
 }
 
@@ -69,11 +69,11 @@ fn a_sequence_goes_on_when_the_cell_in_the_same_program_slept_as_well() {
     const NAP: Duration = Duration::from_secs(6);
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
-    let (child, mut said) = auto(&out, &[]);
-    until_said(&mut said, "pose 2 of 10 captured");
+    let (child, mut reported) = auto(&out, &[]);
+    until_message(&mut reported, "pose 2 of 10 captured");
     put_to_sleep(&child);
     // Nothing is to be waited for but time itself.
     std::thread::sleep(NAP);
     signal(&child, "CONT");
-    check(child, said, &out);
+    check(child, reported, &out);
 }

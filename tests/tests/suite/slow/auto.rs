@@ -104,9 +104,12 @@ fn an_arm_of_another_name_is_calibrated_once_the_objects_of_its_scene_are_named(
     let address = format!("tcp://127.0.0.1:{}", cell.port());
     let connected = ["--connect", &address, "--poses", "guided", "--goal", "0.3"];
     let lost = handeye(&[&["auto", "--quiet"][..], &connected].concat());
-    let said = String::from_utf8_lossy(&lost.stderr).into_owned();
-    assert_eq!(lost.status.code(), Some(1), "{said}");
-    assert!(said.contains("/UR5/Tip") && said.contains("/Target, /Tip") && said.contains("--object"), "{said}");
+    let reported = String::from_utf8_lossy(&lost.stderr).into_owned();
+    assert_eq!(lost.status.code(), Some(1), "{reported}");
+    assert!(
+        reported.contains("/UR5/Tip") && reported.contains("/Target, /Tip") && reported.contains("--object"),
+        "{reported}"
+    );
     let wrong = handeye(&["auto", "--object", "flange=/Franka"]);
     assert_eq!(wrong.status.code(), Some(2), "{}", String::from_utf8_lossy(&wrong.stderr));
 
@@ -284,9 +287,9 @@ fn a_pose_that_gives_no_capture_is_named_and_left_out() {
     let poses = poses(folder.path(), 5, away);
     let out = folder.path().join("session");
     let output = handeye(&["auto", "--out", out.to_str().expect("UTF-8"), "--poses", &poses]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    assert!(said.contains(r#"pose "away" is left out: The board was not found"#), "{said}");
+    let reported = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{reported}");
+    assert!(reported.contains(r#"pose "away" is left out: The board was not found"#), "{reported}");
     let session = Session::open(&out).expect("a session");
     let names: Vec<_> = session.document.captures.iter().filter_map(|capture| capture.pose_name.clone()).collect();
     assert_eq!(names, ["P1", "P2", "P3", "P4", "P5"]);
@@ -301,8 +304,8 @@ fn a_camera_out_of_focus_gives_no_session_to_solve_but_the_reason() {
     let out = folder.path().join("session");
     let [scene, out] = [&scene, &out].map(|path| path.to_str().expect("UTF-8"));
     let output = handeye(&["auto", "--scene", scene, "--out", out, "--poses", &poses]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains(r#"pose "P1" is left out: "#), "{said}");
-    assert!(said.contains("none of the 2 poses gave a capture"), "{said}");
+    let reported = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{reported}");
+    assert!(reported.contains(r#"pose "P1" is left out: "#), "{reported}");
+    assert!(reported.contains("none of the 2 poses gave a capture"), "{reported}");
 }

@@ -40,8 +40,8 @@ fn it_is_calibrated_from_an_arm_that_stands_straight_up_and_a_board_at_rest_is_f
     let (session, file) = (folder.path().join("session").display().to_string(), folder.path().join("result.json"));
     let out = file.display().to_string();
     let run = handeye(&["auto", "--connect", &endpoint, "--poses", "guided", "--out", &session, "--json", &out]);
-    let said = String::from_utf8_lossy(&run.stderr);
-    assert!(said.contains("the board is not in view here: the arm goes to a view of the board"), "{said}");
+    let reported = String::from_utf8_lossy(&run.stderr);
+    assert!(reported.contains("the board is not in view here: the arm goes to a view of the board"), "{reported}");
     drop(cell);
     let result = json(&file);
     let views = result["views"].as_array().expect("views").len();

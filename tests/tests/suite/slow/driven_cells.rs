@@ -80,7 +80,7 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.until("the poses", |model| model.taught().len() == 10);
     bench.click(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("the refusal", |model| !model.sequence_runs);
-    assert!(bench.said().contains("only read"), "nothing moves before somebody allows it: {}", bench.said());
+    assert!(bench.text().contains("only read"), "nothing moves before somebody allows it: {}", bench.text());
     bench.click(connect::Command::Arm(true));
     bench.until("the permission", Model::is_armed);
     bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
@@ -101,7 +101,7 @@ fn two_drivers_with_clocks_80_ms_apart_calibrate_and_outlive_one_that_is_killed(
     bench.click(motion::Command::ConfirmMove);
     bench.until("the rest of the sequence", |model| !model.sequence_runs && model.motion == Motion::Idle);
     bench.until("a solution", is_solved);
-    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
+    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.text());
     let truth = arm(&endpoint).ground_truth().expect("a cell of this project").tip_from_camera;
     let mm = error_mm(&bench, &truth);
     assert!(mm < 0.5, "{mm} mm: a clock off by 80 ms, or an image of another pose, would show here");
@@ -135,8 +135,8 @@ fn the_arm_behind_a_driver_calibrates_itself_once_it_is_allowed_to_move_whatever
         bench.until("a solution", is_solved);
         let model = bench.model();
         let guided = model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref()).expect("guided");
-        let ending = guided.ending.as_ref().unwrap_or_else(|| panic!("{name}: {}", bench.said()));
-        assert!(ending.is_success() && guided.checked == CHECKS, "{name}: {ending:?}, {}", bench.said());
+        let ending = guided.ending.as_ref().unwrap_or_else(|| panic!("{name}: {}", bench.text()));
+        assert!(ending.is_success() && guided.checked == CHECKS, "{name}: {ending:?}, {}", bench.text());
         let truth = scene.scene().and_then(|scene| scene.resolve(0)).expect("it is shipped").tip_from_camera;
         let mm = error_mm(&bench, &truth);
         assert!(mm < model.view.goal.0 * 1e3, "{name}: {mm} mm");
@@ -171,7 +171,7 @@ fn a_robot_that_is_moved_by_hand_is_calibrated_with_poses_that_are_typed() {
     // The pose of the last capture is not that of the next one.
     bench.click(capture::Command::Take(CapturePurpose::Calibrate));
     bench.until("the refusal", |model| model.refused.is_some());
-    assert!(bench.said().contains("type the pose that its pendant shows"), "{}", bench.said());
+    assert!(bench.text().contains("type the pose that its pendant shows"), "{}", bench.text());
 }
 
 #[test]
@@ -186,8 +186,8 @@ fn a_driver_that_ends_at_once_is_tried_a_few_times_says_why_and_then_waits_for_a
     bench.until("the end of the tries", |model| {
         [&model.control, &model.camera].iter().all(|link| matches!(link, LinkState::Failed { .. }))
     });
-    let said = bench.said();
-    assert!(said.contains("starts in a row failed") && said.contains("no camera is plugged in"), "{said}");
+    let reported = bench.text();
+    assert!(reported.contains("starts in a row failed") && reported.contains("no camera is plugged in"), "{reported}");
     let tried = starts();
     assert!((3..20).contains(&tried), "{tried} starts by three threads");
 

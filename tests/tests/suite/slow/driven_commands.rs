@@ -12,7 +12,7 @@ use handeye_result::CalibrationResult;
 use handeye_server::{CellConfig, CellServer};
 use handeye_session::Session;
 use handeye_tests::handeye_binary;
-use handeye_tests::process::{end_of, signal, start, until_said};
+use handeye_tests::process::{end_of, signal, start, until_message};
 use serde_json::Value;
 
 /// A cell that keeps pace with real time, as drivers of hardware do; with another client that looks at it.
@@ -46,7 +46,7 @@ fn handeye(arguments: &[&str]) -> Output {
     Command::new(handeye_binary()).args(arguments).output().expect("the binary is built: cargo build -p handeye_app")
 }
 
-fn said(output: &Output) -> String {
+fn reported(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -69,16 +69,16 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     let auto = [&["auto", "--poses", "seed10", "--out", out, "--speed", "100"][..], &drivers].concat();
 
     let no_board = handeye(&auto);
-    assert_eq!(no_board.status.code(), Some(2), "{}", said(&no_board));
-    assert!(said(&no_board).contains("--target 10x7x15"), "a board is never guessed: {}", said(&no_board));
+    assert_eq!(no_board.status.code(), Some(2), "{}", reported(&no_board));
+    assert!(reported(&no_board).contains("--target 10x7x15"), "a board is never guessed: {}", reported(&no_board));
     let auto = [&auto[..], &["--target", "10x7x15"]].concat();
 
     let before = cell.joints();
     let refused = handeye(&auto);
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("--allow-motion"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(2), "{}", reported(&refused));
+    assert!(reported(&refused).contains("--allow-motion"), "{}", reported(&refused));
     let planned = handeye(&[&auto[..], &["--dry-run"]].concat());
-    assert!(planned.status.success(), "{}", said(&planned));
+    assert!(planned.status.success(), "{}", reported(&planned));
     let plan = String::from_utf8_lossy(&planned.stdout).into_owned();
     assert!(plan.contains("to the start: joints") && plan.ends_with("nothing was moved\n"), "{plan}");
     assert_eq!(plan.matches(" mm, turned about ").count(), 10, "{plan}");
@@ -86,9 +86,13 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     assert_eq!(cell.joints(), before, "nothing moves that nobody allowed");
 
     let done = handeye(&[&auto[..], &["--allow-motion"]].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    assert!(done.status.success(), "{}", reported(&done));
     for number in 1..=11 {
-        assert!(said(&done).contains(&format!("motion {number}: arrived")), "every motion is logged: {}", said(&done));
+        assert!(
+            reported(&done).contains(&format!("motion {number}: arrived")),
+            "every motion is logged: {}",
+            reported(&done)
+        );
     }
     let truth = cell.watch.ground_truth().expect("a cell of this project").tip_from_camera;
     let mm = error_mm(&session, &truth);
@@ -100,7 +104,7 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     let tracking = ["track", "--calibration", result.to_str().expect("UTF-8"), "--json", track_file];
     let tracking = [&tracking[..], &drivers].concat();
     let watched = handeye(&[&tracking[..], &["--frames", "20"]].concat());
-    assert!(watched.status.success(), "{}", said(&watched));
+    assert!(watched.status.success(), "{}", reported(&watched));
     let read = |file: &Path| -> Value {
         serde_json::from_str(&std::fs::read_to_string(file).expect("it is written")).expect("JSON")
     };
@@ -110,12 +114,12 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     let reach = [&tracking[..], &["--reach", "0", "--stand-off", "150"]].concat();
     let before = cell.joints();
     let refused = handeye(&reach);
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(2), "{}", reported(&refused));
     let planned = handeye(&[&reach[..], &["--dry-run"]].concat());
-    assert!(String::from_utf8_lossy(&planned.stdout).contains("to corner 0: tip at"), "{}", said(&planned));
+    assert!(String::from_utf8_lossy(&planned.stdout).contains("to corner 0: tip at"), "{}", reported(&planned));
     assert_eq!(cell.joints(), before, "nothing moves that nobody allowed");
     let reached = handeye(&[&reach[..], &["--allow-motion", "--speed", "100"]].concat());
-    assert!(reached.status.success(), "{}", said(&reached));
+    assert!(reached.status.success(), "{}", reported(&reached));
     cell.watch.settle(&SettleOptions::default(), &CancelToken::default()).expect("it stands");
     let truth = cell.watch.ground_truth().expect("a cell of this project");
     let board = truth.base_from_target.expect("published");
@@ -126,7 +130,7 @@ fn a_real_cell_is_calibrated_and_tracked_from_the_command_line_once_it_may_move(
     assert!(off_mm < 1.5, "the tip is {off_mm} mm from where it was to be: {from_board}");
 
     let follows = handeye(&[&tracking[..], &["--follow", "--allow-motion"]].concat());
-    assert_eq!(follows.status.code(), Some(2), "{}", said(&follows));
+    assert_eq!(follows.status.code(), Some(2), "{}", reported(&follows));
 }
 
 #[test]
@@ -155,8 +159,8 @@ fn ctrl_c_stops_the_robot_says_whether_it_stands_and_keeps_what_was_captured() {
         "40",
     ];
     let (mut command, mut messages) = start(&arguments);
-    until_said(&mut messages, "pose 1 of 10 captured");
-    until_said(&mut messages, "motion 3, to");
+    until_message(&mut messages, "pose 1 of 10 captured");
+    until_message(&mut messages, "motion 3, to");
     let stood = cell.joints();
     while cell.joints() == stood {
         std::thread::yield_now();
@@ -197,9 +201,9 @@ fn guided_capture_over_a_driver_reaches_the_goal_from_the_command_line() {
     ];
     let planned = handeye(&[&arguments[..], &["--dry-run"]].concat());
     let plan = String::from_utf8_lossy(&planned.stdout).into_owned();
-    assert!(planned.status.success() && plan.contains("where it stands"), "{plan}{}", said(&planned));
+    assert!(planned.status.success() && plan.contains("where it stands"), "{plan}{}", reported(&planned));
     let done = handeye(&[&arguments[..], &["--allow-motion"]].concat());
-    assert!(done.status.success(), "{}", said(&done));
+    assert!(done.status.success(), "{}", reported(&done));
     let truth =
         ShippedScene::Reference.scene().and_then(|scene| scene.resolve(0)).expect("it is shipped").tip_from_camera;
     let mm = error_mm(&session, &truth);

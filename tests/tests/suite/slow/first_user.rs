@@ -58,7 +58,7 @@ fn a_first_user_gets_from_the_start_to_exported_files_with_few_clicks() {
         assert!(session.join(file).is_file(), "{file}");
     }
 
-    // The same session again, as a reader of Chinese who likes it light; nothing was said to be saved.
+    // The same session again, as a reader of Chinese who likes it light; nothing was reported to be saved.
     let session = session.to_string_lossy().into_owned();
     let copy = tempfile::tempdir().expect("a folder");
     let kept = copy.path().join("标定");

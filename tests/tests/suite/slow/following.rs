@@ -11,7 +11,7 @@ use handeye_session::CaptureId;
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{handeye_binary, workspace_root};
 use handeye_track::State;
-use handeye_workbench::model::{BoardMotion, BoardPath, CellSource, FollowStatus, FollowWish, Model};
+use handeye_workbench::model::{BoardMotion, BoardPath, CellSource, FollowRequest, FollowStatus, Model};
 use handeye_workbench::{connect, motion, track};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -146,7 +146,7 @@ fn deviation_of(
     for _ in 0..passes_in(seconds) {
         cell.pass(bench);
         let model = bench.model();
-        assert!(!matches!(model.track.follow, FollowStatus::Ended(_)), "{}", bench.said());
+        assert!(!matches!(model.track.follow, FollowStatus::Ended(_)), "{}", bench.text());
         let (metres, radians) = view(model).distance_to(kept);
         squares = [squares[0] + metres * metres, squares[1] + radians * radians];
     }
@@ -159,7 +159,7 @@ fn the_view_is_kept_while_the_board_moves_and_exactly_once_it_stands() {
     let (mut bench, mut cell) = tracking(folder.path());
     let newest = bench.model().track.newest.clone().expect("tracked");
     let kept = newest.update.seen.as_ref().expect("seen").camera_from_target;
-    bench.click(track::Command::SetFollow(Some(FollowWish::KeepPose(kept))));
+    bench.click(track::Command::SetFollow(Some(FollowRequest::KeepPose(kept))));
     bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
     cell.paced(true);
     bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Circle, speed_m_s: SPEED_M_S }));
@@ -190,9 +190,9 @@ fn the_view_is_kept_with_nothing_but_what_coppeliasim_has() {
     let (mut bench, mut cell) = tracking_at(folder.path(), "assets/scenes/realistic.toml", config, FIRST);
     cell.paced(true);
     let kept = seen_view(bench.model());
-    bench.click(track::Command::SetFollow(Some(FollowWish::KeepPose(kept))));
+    bench.click(track::Command::SetFollow(Some(FollowRequest::KeepPose(kept))));
     while !matches!(bench.model().track.follow, FollowStatus::Following { .. }) {
-        assert!(!matches!(bench.model().track.follow, FollowStatus::Ended(_)), "{}", bench.said());
+        assert!(!matches!(bench.model().track.follow, FollowStatus::Ended(_)), "{}", bench.text());
         cell.pass(&mut bench);
     }
     cell.passes(&mut bench, 2.0);
@@ -215,7 +215,7 @@ fn after_the_ten_poses_one_click_follows_the_board_along_every_path_for_minutes(
     let scene = Scene::reference().expect("the scene");
     let (mut bench, mut cell) =
         tracking_at(folder.path(), "assets/scenes/reference.toml", CellConfig::new(scene), LAST);
-    bench.click(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)));
+    bench.click(track::Command::SetFollow(Some(FollowRequest::KeepViewWithRoom)));
     bench.until("the move to where there is room", |model| model.track.follow == FollowStatus::MakingRoom);
     bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
     for path in [BoardPath::Circle, BoardPath::FigureEight, BoardPath::RandomWalk, BoardPath::Step] {
@@ -230,7 +230,7 @@ fn after_the_ten_poses_one_click_follows_the_board_along_every_path_for_minutes(
         bench.click(track::Command::MoveBoard(BoardMotion { path: BoardPath::Still, speed_m_s: SPEED_M_S }));
         cell.passes(&mut bench, 4.0);
         cell.paced(false);
-        assert!(matches!(bench.model().track.follow, FollowStatus::Following { .. }), "{path}: {}", bench.said());
+        assert!(matches!(bench.model().track.follow, FollowStatus::Following { .. }), "{path}: {}", bench.text());
     }
 }
 
@@ -244,7 +244,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
     let paths = [BoardPath::Circle, BoardPath::FigureEight, BoardPath::RandomWalk, BoardPath::Step];
     for trial in 0..trials {
         let path = paths[rng.random_range(0..paths.len())];
-        bench.click(track::Command::SetFollow(Some(FollowWish::KeepView)));
+        bench.click(track::Command::SetFollow(Some(FollowRequest::KeepView)));
         bench.until("following", |model| matches!(model.track.follow, FollowStatus::Following { .. }));
         cell.paced(true);
         bench.click(track::Command::MoveBoard(BoardMotion { path, speed_m_s: 0.1 }));
@@ -264,7 +264,7 @@ fn an_arm_whose_board_is_hidden_comes_to_rest_within_its_limits() {
                 fastest_rad_s = fastest_rad_s.max(speed);
                 at_rest_since_s = if speed > 0.0 { None } else { at_rest_since_s.or(Some(now.sim_time_s)) };
             }
-            assert!(now.sim_time_s < hidden_s + 5.0, "trial {trial}: the arm still moves; {}", bench.said());
+            assert!(now.sim_time_s < hidden_s + 5.0, "trial {trial}: the arm still moves; {}", bench.text());
             before = now;
         }
         // The arm waits for a while before it gives up; until then the board would go out of the image of the first pose.

@@ -67,8 +67,8 @@ fn a_goal_out_of_reach_fails_with_the_reason_and_keeps_the_answer() {
     let scene = scene("realistic.toml");
     let output = auto(folder.path(), &[&arguments[..], &["--scene", &scene]].concat());
     assert_eq!(output.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("the goal is not reached") && said.contains("allow more"), "{said}");
+    let reported = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(reported.contains("the goal is not reached") && reported.contains("allow more"), "{reported}");
     let result = CalibrationResult::read(&folder.path().join("session/result.json")).expect("a result all the same");
     assert_eq!(result.views.len(), 9);
     assert!(result.verification.is_none());
@@ -113,10 +113,10 @@ fn one_click_leads_from_the_board_in_view_to_a_checked_answer_below_the_goal() {
     let model = bench.model();
     let solved = model.solve.current().expect("solved");
     let error_mm = solved.result.quality.tip_error_95_mm.expect("stated");
-    assert!(error_mm <= model.view.goal.0 * 1e3, "{error_mm} mm: {}", bench.said());
+    assert!(error_mm <= model.view.goal.0 * 1e3, "{error_mm} mm: {}", bench.text());
     assert!((8..=16).contains(&count(model, Role::Calibration)), "{}", count(model, Role::Calibration));
     assert_eq!(count(model, Role::Verification), 3);
-    assert!(bench.said().contains("The goal is reached"), "{}", bench.said());
+    assert!(bench.text().contains("The goal is reached"), "{}", bench.text());
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn step_by_step_each_move_is_let_or_skipped_and_all_of_it_is_kept_in_the_session
         Some(record.steps.into_iter().map(|step| step.outcome).collect())
     };
     bench.until("the record", |_| {
-        outcomes().is_some_and(|said| said == ["skipped", "captured", "captured", "captured", "pending"])
+        outcomes().is_some_and(|reported| reported == ["skipped", "captured", "captured", "captured", "pending"])
     });
 }
 
@@ -212,8 +212,8 @@ fn a_person_who_brings_about_the_views_that_are_asked_for_gets_a_checked_answer(
     bench.until("the checks", |model| model.solve.current().is_some_and(|solved| solved.verified_captures.len() == 3));
     let model = bench.model();
     let error_mm = model.solve.current().and_then(|solved| solved.result.quality.tip_error_95_mm).expect("stated");
-    assert!(error_mm <= model.view.goal.0 * 1e3, "{error_mm} mm: {}", bench.said());
+    assert!(error_mm <= model.view.goal.0 * 1e3, "{error_mm} mm: {}", bench.text());
     assert!(count(model, Role::Calibration) >= 8);
     println!("{skipped} views were out of reach");
-    assert!(bench.said().contains("The goal is reached"), "{}", bench.said());
+    assert!(bench.text().contains("The goal is reached"), "{}", bench.text());
 }

@@ -11,7 +11,7 @@ use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, MotionLimits
 use handeye_record::RerunChoice;
 use handeye_session::Session;
 use handeye_tests::CellProcess;
-use handeye_tests::process::{end_of, signal, start, until_said};
+use handeye_tests::process::{end_of, signal, start, until_message};
 use handeye_tests::workbench::Workbench;
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureWait, CellSource, Model};
 use handeye_workbench::{capture, connect, motion, taught};
@@ -25,17 +25,17 @@ use crate::solved::copy_of_session;
 const A_REPLY: Duration = Duration::from_secs(5);
 
 /// How it ends, and what it still says.
-fn end(mut child: Child, mut said: BufReader<ChildStderr>) -> (Option<i32>, String) {
+fn end(mut child: Child, mut reported: BufReader<ChildStderr>) -> (Option<i32>, String) {
     let mut rest = String::new();
-    said.read_to_string(&mut rest).expect("text");
+    reported.read_to_string(&mut rest).expect("text");
     (end_of(&mut child).code(), rest)
 }
 
 /// Kills the cell of a command, which has to end soon; what it still says.
-fn end_after(cell: &mut CellProcess, child: Child, said: BufReader<ChildStderr>) -> String {
+fn end_after(cell: &mut CellProcess, child: Child, reported: BufReader<ChildStderr>) -> String {
     cell.kill();
     let killed = Instant::now();
-    let (code, rest) = end(child, said);
+    let (code, rest) = end(child, reported);
     let took = killed.elapsed();
     println!("ended {took:?} after its server");
     assert_eq!(code, Some(1), "{rest}");
@@ -80,12 +80,12 @@ fn auto_waits_out_a_pause_and_leaves_a_simulation_running_that_it_did_not_start(
     let auto = Auto::on_a_cell();
     let mut person = person(&auto.cell);
     person.sim().start_simulation().expect("an answer");
-    let (child, mut said) = auto.start(&[]);
-    until_said(&mut said, "pose 2 of 10 captured");
+    let (child, mut reported) = auto.start(&[]);
+    until_message(&mut reported, "pose 2 of 10 captured");
     person.sim().pause_simulation().expect("an answer");
-    until_said(&mut said, "the simulation is paused");
+    until_message(&mut reported, "the simulation is paused");
     person.sim().start_simulation().expect("an answer");
-    let (code, rest) = end(child, said);
+    let (code, rest) = end(child, reported);
     assert_eq!(code, Some(0), "{rest}");
     assert_eq!(auto.captures(), 10, "{rest}");
     assert_eq!(person.sim().get_simulation_state(), Ok(SimulationState::Running));
@@ -110,13 +110,13 @@ fn auto_takes_a_capture_again_whose_images_a_pause_broke_off() {
     let auto = Auto::on_a_cell();
     let mut person = person(&auto.cell);
     // With so many images to average the arm stands at a pose longer than it is on its way to it.
-    let (child, mut said) = auto.start(&["--frames", "64"]);
-    until_said(&mut said, "pose 1 of 10 captured");
+    let (child, mut reported) = auto.start(&["--frames", "64"]);
+    until_message(&mut reported, "pose 1 of 10 captured");
     until_it_stands(&mut person, 20);
     person.sim().pause_simulation().expect("an answer");
-    until_said(&mut said, "the simulation is paused");
+    until_message(&mut reported, "the simulation is paused");
     person.sim().start_simulation().expect("an answer");
-    let (code, rest) = end(child, said);
+    let (code, rest) = end(child, reported);
     assert_eq!(code, Some(0), "{rest}");
     assert_eq!(auto.captures(), 10, "{rest}");
 }
@@ -145,7 +145,7 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("the images of the second pose", |model| model.document().captures.len() == 1 && averages(model));
     person.sim().pause_simulation().expect("an answer");
     bench.until("the end of the sequence", |model| !model.sequence_runs);
-    assert_eq!(bench.model().document().captures.len(), 1, "{}", bench.said());
+    assert_eq!(bench.model().document().captures.len(), 1, "{}", bench.text());
 
     bench.click(connect::Command::StartSimulation);
     bench.until("passing time", |model| model.resting_simulation().is_none());
@@ -155,7 +155,7 @@ fn a_sequence_of_the_window_goes_on_after_a_pause_with_the_pose_that_has_no_capt
     bench.until("the first move that waits", |model| model.asked.is_some());
     bench.click(motion::Command::ConfirmMove);
     bench.until("the end of the sequence", |model| !model.sequence_runs);
-    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
+    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.text());
 }
 
 /// Has the arm stand where it saw the board, with room to follow it.
@@ -182,22 +182,22 @@ fn following_that_loses_its_board_fails_and_says_why_and_what_was_asked_for_is_n
         track["summary"].clone()
     };
 
-    let (child, said) = start(&[&follow[..], &["--frames", "20"]].concat());
-    let (code, rest) = end(child, said);
+    let (child, reported) = start(&[&follow[..], &["--frames", "20"]].concat());
+    let (code, rest) = end(child, reported);
     assert_eq!(code, Some(0), "{rest}");
     assert!(summary()["error"].is_null() && summary()["follow_ended"].is_null(), "{:#}", summary());
 
-    let (child, mut said) = start(&follow);
-    until_said(&mut said, "images/s");
+    let (child, mut reported) = start(&follow);
+    until_message(&mut reported, "images/s");
     signal(&child, "INT");
-    let (code, rest) = end(child, said);
+    let (code, rest) = end(child, reported);
     assert_eq!(code, Some(0), "{rest}");
     assert!(summary()["follow_ended"].is_null(), "{:#}", summary());
 
-    let (child, mut said) = start(&follow);
-    until_said(&mut said, "images/s");
+    let (child, mut reported) = start(&follow);
+    until_message(&mut reported, "images/s");
     person.show_board(false).expect("an answer");
-    let (code, rest) = end(child, said);
+    let (code, rest) = end(child, reported);
     assert_eq!(code, Some(1), "{rest}");
     assert!(rest.trim_end().lines().last().is_some_and(|last| last.contains("following ended by itself")), "{rest}");
     for key in ["error", "follow_ended"] {
@@ -209,10 +209,10 @@ fn following_that_loses_its_board_fails_and_says_why_and_what_was_asked_for_is_n
 fn a_simulation_that_is_ended_is_named_and_nobody_else_is_blamed() {
     let auto = Auto::on_a_cell();
     let mut person = person(&auto.cell);
-    let (child, mut said) = auto.start(&[]);
-    until_said(&mut said, "pose 2 of 10 captured");
+    let (child, mut reported) = auto.start(&[]);
+    until_message(&mut reported, "pose 2 of 10 captured");
     person.sim().stop_simulation().expect("an answer");
-    let (code, rest) = end(child, said);
+    let (code, rest) = end(child, reported);
     assert_eq!(code, Some(1), "{rest}");
     assert!(rest.contains("simulation is stopped") && !rest.contains("another client"), "{rest}");
     assert!(rest.contains("kept in"), "{rest}");
@@ -221,9 +221,9 @@ fn a_simulation_that_is_ended_is_named_and_nobody_else_is_blamed() {
 #[test]
 fn auto_ends_soon_after_its_server_and_keeps_what_it_captured() {
     let mut auto = Auto::on_a_cell();
-    let (child, mut said) = auto.start(&[]);
-    until_said(&mut said, "pose 2 of 10 captured");
-    let rest = end_after(&mut auto.cell, child, said);
+    let (child, mut reported) = auto.start(&[]);
+    until_message(&mut reported, "pose 2 of 10 captured");
+    let rest = end_after(&mut auto.cell, child, reported);
     assert!(rest.contains("kept in"), "{rest}");
     assert!(auto.captures() >= 2, "{rest}");
 }
@@ -237,15 +237,15 @@ fn a_track_says_what_it_waits_for_and_its_json_is_whole_when_the_server_dies() {
     let address = format!("tcp://127.0.0.1:{}", cell.port());
     let file = folder.path().join("track.json");
     let json = file.display().to_string();
-    let (child, mut said) = start(&["track", "--connect", &address, "--calibration", &session, "--json", &json]);
-    until_said(&mut said, "the simulation is stopped: waiting until it is started");
+    let (child, mut reported) = start(&["track", "--connect", &address, "--calibration", &session, "--json", &json]);
+    until_message(&mut reported, "the simulation is stopped: waiting until it is started");
     person.sim().start_simulation().expect("an answer");
-    until_said(&mut said, "images/s");
+    until_message(&mut reported, "images/s");
     person.sim().pause_simulation().expect("an answer");
-    until_said(&mut said, "the simulation is paused: waiting until it is continued");
+    until_message(&mut reported, "the simulation is paused: waiting until it is continued");
     person.sim().start_simulation().expect("an answer");
-    until_said(&mut said, "the simulation goes on");
-    end_after(&mut cell, child, said);
+    until_message(&mut reported, "the simulation goes on");
+    end_after(&mut cell, child, reported);
     let track: Value = serde_json::from_slice(&std::fs::read(file).expect("written")).expect("JSON");
     assert!(track["summary"]["error"].as_str().is_some_and(|why| why.contains("closed the connection")), "{track:#}");
     let frames = track["frames"].as_array().map(Vec::len);

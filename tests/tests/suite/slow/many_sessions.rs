@@ -61,10 +61,10 @@ fn alone(test: &str) {
         .env_remove("WAYLAND_DISPLAY")
         .output()
         .expect("it runs");
-    let said = String::from_utf8_lossy(&run.stdout);
-    println!("{said}");
-    assert!(run.status.success(), "{said}{}", String::from_utf8_lossy(&run.stderr));
-    assert!(said.contains("sessions: "), "{said}");
+    let reported = String::from_utf8_lossy(&run.stdout);
+    println!("{reported}");
+    assert!(run.status.success(), "{reported}{}", String::from_utf8_lossy(&run.stderr));
+    assert!(reported.contains("sessions: "), "{reported}");
 }
 
 /// One more session, in which the person goes through all steps.

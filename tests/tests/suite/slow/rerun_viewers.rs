@@ -35,8 +35,8 @@ fn shots() -> PathBuf {
 fn native_viewer() -> Option<PathBuf> {
     // The program itself: the `rerun` on the path of Python starts it as a child, which signals do not reach.
     let where_it_is = "import rerun_cli, os; print(os.path.join(os.path.dirname(rerun_cli.__file__), 'rerun'))";
-    let said = Command::new(python()?).args(["-c", where_it_is]).output().expect("python runs");
-    let viewer = PathBuf::from(String::from_utf8_lossy(&said.stdout).trim());
+    let reported = Command::new(python()?).args(["-c", where_it_is]).output().expect("python runs");
+    let viewer = PathBuf::from(String::from_utf8_lossy(&reported.stdout).trim());
     if viewer.is_file() {
         return Some(viewer);
     }
@@ -109,9 +109,9 @@ fn a_browser_without_network_shows_a_live_session_in_3d() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary is built: cargo build -p handeye_app");
-    let said = session.stderr.take().expect("its messages");
+    let reported = session.stderr.take().expect("its messages");
     let _session = Ends(session);
-    let url = address(said);
+    let url = address(reported);
     // The arm is on its way to its poses meanwhile.
     let image = shots().join("rerun-web.png");
     let deadline = Instant::now() + PATIENCE;

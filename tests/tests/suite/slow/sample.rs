@@ -46,7 +46,7 @@ fn sample() -> PathBuf {
     workspace_root().join("assets/samples/ur5")
 }
 
-/// Not a test: photographs the cell anew, where the sample shall change.
+/// Not a test: photographs the cell again, where the sample shall change.
 /// `cargo test -p handeye_tests -- --ignored photograph_the_sample`
 #[test]
 #[ignore = "writes assets/samples/ur5"]

@@ -68,7 +68,7 @@ fn first_user(desktop: &mut Desktop) {
         assert!(session.join(file).is_file(), "{file}");
     }
     let (browser, _) = desktop.page();
-    assert_eq!(browser.said(), [] as [String; 0], "the page complains");
+    assert_eq!(browser.text(), [] as [String; 0], "the page complains");
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn a_calibration_is_verified_at_planned_poses_that_were_not_in_the_fit() {
     });
     let model = bench.model();
     let (fitted, checks) = (poses(model, Role::Calibration), poses(model, Role::Verification));
-    assert_eq!((fitted.len(), checks.len()), (10, 5), "{}", bench.said());
+    assert_eq!((fitted.len(), checks.len()), (10, 5), "{}", bench.text());
     for check in &checks {
         let nearest_rad =
             fitted.iter().map(|pose| pose.rotation().angle_to(&check.rotation())).fold(f64::INFINITY, f64::min);

@@ -40,7 +40,7 @@ fn sequence_done(sessions: &Path) -> (Workbench, CellServer) {
     bench.allow(taught::Command::RunSequence { purpose: Some(CapturePurpose::Calibrate) });
     bench.until("the end of the sequence", |model| !model.sequence_runs);
     bench.until("a solution", idle_and_fresh);
-    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
+    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.text());
     (bench, cell)
 }
 
@@ -56,7 +56,7 @@ fn captured(folder: &Path) -> Workbench {
     let address = CellSource::Address("tcp://127.0.0.1:1".to_owned());
     let mut bench = Workbench::start(address, folder, Some(session));
     bench.until("a solution", |model| model.session.folder.is_some() && idle_and_fresh(model));
-    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.said());
+    assert_eq!(bench.model().document().captures.len(), 10, "{}", bench.text());
     bench
 }
 
@@ -209,8 +209,8 @@ fn a_session_that_cannot_be_opened_says_why_and_leaves_the_present_one_alone() {
     bench.until("a session", |model| model.session.folder.is_some());
     bench.click(session::Command::Open(broken));
     bench.until("the answer", |model| {
-        let said = |message: &Message| message.text.say(Language::English).contains("was not opened");
-        !model.opening && model.messages.iter().any(said)
+        let reported = |message: &Message| message.text.in_language(Language::English).contains("was not opened");
+        !model.opening && model.messages.iter().any(reported)
     });
     assert_eq!(bench.model().session.name().as_deref(), Some("mine"));
 }

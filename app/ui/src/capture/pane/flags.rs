@@ -63,7 +63,7 @@ fn why_aside(row: &CaptureRow, language: Language) -> Option<String> {
              difference."
         ),
     };
-    Some(why.say(language))
+    Some(why.in_language(language))
 }
 
 /// The same of single corners.
@@ -73,7 +73,7 @@ fn why_corners_aside(row: &CaptureRow, language: Language) -> Option<String> {
          {count}. Look there for reflections and things in front of the board.",
         count = row.corners_aside
     );
-    (row.corners_aside > 0 && !row.excluded && !row.verifies() && !row.is_aside()).then(|| why.say(language))
+    (row.corners_aside > 0 && !row.excluded && !row.verifies() && !row.is_aside()).then(|| why.in_language(language))
 }
 
 /// The remarks on a capture, the worst first.
@@ -125,7 +125,7 @@ pub fn flags(row: &CaptureRow, circumstances: Circumstances, language: Language)
             rms = rms,
             line = line
         );
-        flag(Some(Tone::Warning), tr!(language, "Above the line"), why.say(language));
+        flag(Some(Tone::Warning), tr!(language, "Above the line"), why.in_language(language));
     }
     if row.found.contains(&FindingCode::LargeResidual) {
         let why = tr!(

@@ -22,7 +22,7 @@ use crate::style::theme::{self, Palette, Tone};
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{CaptureOptions, CapturePurpose, CaptureRefused, Model, Moves, PoseSequence};
-use handeye_workbench::scene::Standing;
+use handeye_workbench::scene::CaptureUse;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::{capture, session, taught};
@@ -164,7 +164,7 @@ fn sequence_ui(ui: &mut Ui, model: &Model, hindrance: Option<&'static str>, heig
     if count == 0 || !model.document().captures.is_empty() || model.moves() == Moves::Never {
         return;
     }
-    let name = text!("Run the {count} taught {count|pose|poses}", count = count).say(language);
+    let name = text!("Run the {count} taught {count|pose|poses}", count = count).in_language(language);
     let what = tr!(language, "Moves to one taught pose after the other and captures at each");
     let button = ui.add_enabled(hindrance.is_none(), Button::new(name).min_size(Vec2::new(0.0, height)));
     let button = match hindrance {
@@ -213,22 +213,22 @@ fn selected_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         let what = tr!(language, "Takes the selected captures out of fit and verification; they stay in the session");
         (text!("Exclude {count}", count = count), what)
     };
-    if ui.button(name.say(language)).on_hover_text(what).clicked() {
+    if ui.button(name.in_language(language)).on_hover_text(what).clicked() {
         outbox.send(session::Command::SetExcluded { ids: ids.clone(), excluded: !all_out });
     }
     let what = tr!(language, "Deletes the selected captures; undo brings them back");
-    if ui.button(text!("Delete {count}", count = count).say(language)).on_hover_text(what).clicked() {
+    if ui.button(text!("Delete {count}", count = count).in_language(language)).on_hover_text(what).clicked() {
         outbox.send(session::Command::Delete(ids));
     }
 }
 
 /// How many captures there are of each kind that there is.
 fn counted(table: &CaptureTable, language: Language) -> String {
-    let (fit, aside) = (table.count(Standing::Fit), table.count(Standing::Aside));
+    let (fit, aside) = (table.count(CaptureUse::Fit), table.count(CaptureUse::Rejected));
     let others = [
         (aside, if aside == 1 { tr!(language, "outlier") } else { tr!(language, "outliers") }),
-        (table.count(Standing::Verification), tr!(language, "for verification")),
-        (table.count(Standing::Excluded), tr!(language, "excluded")),
+        (table.count(CaptureUse::Verification), tr!(language, "for verification")),
+        (table.count(CaptureUse::Excluded), tr!(language, "excluded")),
     ];
     let mut parts = vec![format!("{fit} {}", tr!(language, "in the fit"))];
     parts.extend(others.into_iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}")));
@@ -246,8 +246,10 @@ fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let rect = ui.max_rect();
     let (tone, words) = match (&model.capture, kept_refusal(model)) {
-        (Some(capture), _) => (Tone::Busy, waiting(capture).say(language)),
-        (None, Some(refused)) => (Tone::Warning, text!("No capture: {why}", why = refused.why.clone()).say(language)),
+        (Some(capture), _) => (Tone::Busy, waiting(capture).in_language(language)),
+        (None, Some(refused)) => {
+            (Tone::Warning, text!("No capture: {why}", why = refused.why.clone()).in_language(language))
+        }
         (None, None) => return,
     };
     ui.painter().rect_filled(rect, 0.0, palette.tinted(tone));

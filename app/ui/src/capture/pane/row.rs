@@ -37,7 +37,7 @@ pub fn row_ui(
     let palette = Palette::of(ui);
     let language = model.view.language;
     let selected = model.selection.contains(&row.id);
-    let name = text!("Capture {name}", name = row.title()).say(language);
+    let name = text!("Capture {name}", name = row.title()).in_language(language);
     // Rows are reached by the arrow keys, not by Tab: there may be a thousand of them.
     let response = ui.interact(place, ui.id().with(("capture", row.id)), Sense::CLICK);
     response.widget_info(|| {
@@ -96,11 +96,11 @@ pub fn row_ui(
 
 /// What a row says in columns that it has no room for.
 fn hidden(row: &CaptureRow, width: f32, language: Language) -> Option<String> {
-    let said = |column: Column| {
+    let reported = |column: Column| {
         let value = numbers::fixed(column.number(row)?, column.decimals(), 0);
         Some(format!("{}: {value} {}", column.name(language), column.unit()))
     };
-    let lines: Vec<String> = Column::hidden(width).filter_map(said).collect();
+    let lines: Vec<String> = Column::hidden(width).filter_map(reported).collect();
     (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
@@ -160,7 +160,7 @@ fn use_ui(ui: &mut Ui, row: &CaptureRow, cell: Rect, language: Language, outbox:
     let mut used = !row.excluded;
     let place = Rect::from_center_size(cell.center(), Vec2::splat(ui.spacing().interact_size.y));
     let response = ui.put(place, Checkbox::without_text(&mut used));
-    let name = text!("Use capture {id}", id = row.id).say(language);
+    let name = text!("Use capture {id}", id = row.id).in_language(language);
     response.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, used, &name));
     if response.changed() {
         outbox.send(session::Command::SetExcluded { ids: vec![row.id], excluded: !used });

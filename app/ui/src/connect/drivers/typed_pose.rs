@@ -28,11 +28,11 @@ pub fn typed_pose_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let mut draft: Draft = ui.data(|data| data.get_temp(id)).unwrap_or_default();
     parts::section_ui(ui, tr!(language, "Pose that the pendant shows"));
     if model.robot.is_none() {
-        let said = tr!(
+        let reported = tr!(
             language,
             "Move the robot, let it stand, and type its pose before you capture. After each capture the next pose is wanted"
         );
-        parts::notice_ui(ui, Tone::Busy, said, |_| ());
+        parts::notice_ui(ui, Tone::Busy, reported, |_| ());
     }
     ui.horizontal_wrapped(|ui| {
         for (in_metres, unit) in [(false, "mm"), (true, "m")] {
@@ -59,7 +59,7 @@ pub fn typed_pose_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let read = typed_pose::read(&draft.numbers, metres_per_unit, draft.rotation);
     if let (Err(error), false) = (&read, draft.numbers.trim().is_empty()) {
         let colour = Palette::of(ui).bad;
-        ui.add(Label::new(RichText::new(fault(error).say(language)).color(colour)).wrap());
+        ui.add(Label::new(RichText::new(fault(error).in_language(language)).color(colour)).wrap());
     }
     let taken = ui.add_enabled(read.is_ok(), Button::new(tr!(language, "The robot stands here")));
     if let (true, Ok(pose)) = (taken.clicked(), read) {

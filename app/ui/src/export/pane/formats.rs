@@ -50,7 +50,7 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
     let language = model.view.language;
     let name = format.name();
     let refusal = match model.export.previews.get(name) {
-        Some(Err(why)) => Some(why.say(language)),
+        Some(Err(why)) => Some(why.in_language(language)),
         _ => None,
     };
     ui.horizontal(|ui| {
@@ -71,8 +71,8 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let is_shown = model.export.shown.as_deref() == Some(name);
             let response = ui.selectable_label(is_shown, tr!(language, "Show"));
-            let said = text!("Show {format}", format = name).say(language);
-            response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_shown, &said));
+            let reported = text!("Show {format}", format = name).in_language(language);
+            response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_shown, &reported));
             if response.clicked() {
                 outbox.send(export::Command::ShowFormat((!is_shown).then(|| name.to_owned())));
             }
@@ -80,12 +80,12 @@ fn format_ui(ui: &mut Ui, model: &Model, format: &dyn Format, outbox: &mut Outbo
     });
     ui.indent(name, |ui| match refusal {
         Some(why) => {
-            let said = text!("Not possible: {why}", why = why).say(language);
+            let reported = text!("Not possible: {why}", why = why).in_language(language);
             let warning = crate::style::theme::Palette::of(ui).warning;
-            ui.add(egui::Label::new(egui::RichText::new(said).small().color(warning)).wrap());
+            ui.add(egui::Label::new(egui::RichText::new(reported).small().color(warning)).wrap());
         }
         None => {
-            parts::caption_ui(ui, &format.description().say(language));
+            parts::caption_ui(ui, &format.description().in_language(language));
         }
     });
     if model.export.shown.as_deref() == Some(name) {

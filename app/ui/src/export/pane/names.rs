@@ -62,7 +62,7 @@ pub fn names_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
     });
     match draft.names.check() {
-        Err(error) => parts::notice_ui(ui, Tone::Bad, &Text::from(error).say(language), |_| ()),
+        Err(error) => parts::notice_ui(ui, Tone::Bad, &Text::from(error).in_language(language), |_| ()),
         Ok(()) if is_left && draft.names != model.export.names => {
             outbox.send(export::Command::SetNames(draft.names.clone()));
             // It is shown as it was until the names are taken.
@@ -88,5 +88,5 @@ fn meaning_ui(ui: &mut Ui, model: &Model, names: &ExportNames) {
         parent = parent
     );
     let colour = Palette::of(ui).text;
-    ui.add(Label::new(RichText::new(meaning.say(model.view.language)).color(colour)).wrap());
+    ui.add(Label::new(RichText::new(meaning.in_language(model.view.language)).color(colour)).wrap());
 }

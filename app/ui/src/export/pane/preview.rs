@@ -47,7 +47,7 @@ fn file_ui(ui: &mut Ui, model: &Model, file: &PreviewFile) {
                 .desired_width(f32::INFINITY)
                 .desired_rows(4);
             let response = ui.add(field);
-            let said = text!("Text of {file}", file = &file.name).say(language);
-            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &said));
+            let reported = text!("Text of {file}", file = &file.name).in_language(language);
+            response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, &reported));
         });
 }

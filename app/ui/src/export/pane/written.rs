@@ -27,7 +27,7 @@ pub fn write_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ui.horizontal_wrapped(|ui| {
         let chosen = formats::chosen(model).len();
         let reason = why_not(model);
-        let name = text!("Export {count} {count|format|formats}", count = chosen).say(language);
+        let name = text!("Export {count} {count|format|formats}", count = chosen).in_language(language);
         if parts::gated_ui(ui, reason, Button::new(RichText::new(name).strong())).clicked() {
             outbox.send(export::Command::Export);
         }
@@ -71,7 +71,12 @@ pub fn written_ui(ui: &mut Ui, model: &Model) {
     let Some(written) = model.export.written.as_ref().filter(|_| !model.export.writing) else { return };
     let files = match &written.files {
         Err(why) => {
-            parts::notice_ui(ui, Tone::Bad, &text!("Nothing was exported: {why}", why = why).say(language), |_| ());
+            parts::notice_ui(
+                ui,
+                Tone::Bad,
+                &text!("Nothing was exported: {why}", why = why).in_language(language),
+                |_| (),
+            );
             return;
         }
         Ok(files) => files,
@@ -84,7 +89,7 @@ pub fn written_ui(ui: &mut Ui, model: &Model) {
             parts::dot_ui(ui, palette.good);
             ui.label(RichText::new(&name).color(palette.text)).on_hover_text(path.display().to_string());
             ui.label(RichText::new(tr!(language, "read back and compared")).small().color(palette.good));
-            let what = text!("path of {file}", file = &name).say(language);
+            let what = text!("path of {file}", file = &name).in_language(language);
             parts::copy_ui(ui, language, &what, || path.display().to_string());
         });
     }

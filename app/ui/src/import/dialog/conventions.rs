@@ -37,8 +37,8 @@ pub fn fixed_ui(ui: &mut Ui, import: &ImportState, found: &Found, language: Lang
         parts::row_ui(ui, name(key, language), |ui| {
             let combo = ComboBox::from_id_salt(("convention", key)).width(260.0).selected_text(now.unwrap_or(by_data));
             let shown = combo.show_ui(ui, |ui| {
-                for (value, said) in std::iter::once((None, by_data)).chain(values.iter().map(|v| (Some(*v), *v))) {
-                    if ui.selectable_label(now == value, said).clicked() && now != value {
+                for (value, reported) in std::iter::once((None, by_data)).chain(values.iter().map(|v| (Some(*v), *v))) {
+                    if ui.selectable_label(now == value, reported).clicked() && now != value {
                         let value = value.map(str::to_owned);
                         outbox.send(import::Command::FixConvention { key: key.to_owned(), value });
                     }

@@ -21,8 +21,8 @@ pub fn places_ui(ui: &mut Ui, found: &Found, h: &Hypothesis, language: Language)
     let samples = &found.recording.tracks[h.robot].samples;
     let paired = samples.iter().zip(&h.pairing.image_of).filter(|(_, image)| image.is_some());
     let poses: Vec<_> = paired.filter_map(|(sample, _)| h.base_from_tip(sample)).collect();
-    let said = text!("Tip of the robot in {count} {count|view|views}, in its base", count = poses.len());
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, said.say(language)));
+    let reported = text!("Tip of the robot in {count} {count|view|views}, in its base", count = poses.len());
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, reported.in_language(language)));
     let edge = Stroke::new(1.0, palette.edge);
     ui.painter().rect(area, CornerRadius::same(6), palette.paper.gamma_multiply(0.06), edge, egui::StrokeKind::Inside);
     let mut corners: Vec<Point3<f64>> = poses.iter().map(|pose| Point3::from(pose.translation())).collect();
@@ -50,7 +50,7 @@ pub fn places_ui(ui: &mut Ui, found: &Found, h: &Hypothesis, language: Language)
     }
     axes(Point3::origin(), [Vector3::x(), Vector3::y(), Vector3::z()], 0.15 * span, 2.4);
     let caption = Rect::from_min_size(area.min + Vec2::new(6.0, 4.0), Vec2::new(SIDE, 14.0));
-    let size = text!("{mm} mm across", mm = format!("{:.0}", span * 1e3)).say(language);
+    let size = text!("{mm} mm across", mm = format!("{:.0}", span * 1e3)).in_language(language);
     painter.text(caption.min, Align2::LEFT_TOP, size, FontId::proportional(CAPTION), palette.weak);
 }
 

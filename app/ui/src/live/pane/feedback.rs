@@ -43,12 +43,12 @@ pub fn badges_ui(
         let rate = if stale { 0.0 } else { frame.info.rate_hz };
         let words = text!("{rate} fps · {age} s old", rate = format!("{rate:.0}"), age = format!("{age_s:.1}"));
         let colour = if stale { Marks::over_images().review } else { Color32::from_gray(215) };
-        lines.push((words.say(language), colour));
+        lines.push((words.in_language(language), colour));
         // What is less than the error that is good enough is no reason to wait.
         if frame.info.image_off_m > model.view.goal.0 {
             let ms = format!("{:.0}", frame.info.image_age_s * 1e3);
             let words = text!("Image up to {ms} ms older than the pose: let the arm stand", ms = ms);
-            lines.push((words.say(language), Marks::over_images().review));
+            lines.push((words.in_language(language), Marks::over_images().review));
         }
     }
     if shown.capture.is_none() && model.detection.as_ref().is_some_and(|seen| seen.corners.is_none()) {
@@ -56,7 +56,7 @@ pub fn badges_ui(
     }
     if let Some(times) = exaggeration {
         let words = text!("Residuals × {times}", times = format!("{times:.0}"));
-        lines.push((words.say(language), Marks::over_images().residual));
+        lines.push((words.in_language(language), Marks::over_images().residual));
     }
     if model.viewport.zoom > 1.0 {
         lines.push((format!("{:.0} %", points_per_px * 100.0), Color32::from_gray(215)));
@@ -79,13 +79,13 @@ pub fn review_ui(ui: &mut Ui, model: &Model, id: CaptureId, outbox: &mut Outbox)
     let table = rows::table(ui.ctx(), model);
     let row = table.row(id);
     let name = row.map_or_else(|| id.to_string(), rows::CaptureRow::title);
-    let title = text!("Capture {name}, recorded", name = name).say(language);
+    let title = text!("Capture {name}, recorded", name = name).in_language(language);
     let rms = row.and_then(|row| row.rms_px).map(|rms_px| {
         let rms = format!("{rms_px:.3}");
         if row.is_some_and(rows::CaptureRow::verifies) {
-            text!("prediction error {rms} px", rms = rms).say(language)
+            text!("prediction error {rms} px", rms = rms).in_language(language)
         } else {
-            text!("residual {rms} px", rms = rms).say(language)
+            text!("residual {rms} px", rms = rms).in_language(language)
         }
     });
     let inner = rect.shrink2(Vec2::new(super::INSET, 0.0));
@@ -126,14 +126,14 @@ pub fn capture_ui(ui: &mut Ui, model: &Model, room: Rect, in_words: bool, outbox
     }
     let language = model.view.language;
     if let Some(capture) = &model.capture {
-        let words = waiting(capture).say(language);
+        let words = waiting(capture).in_language(language);
         plate_ui(ui, room, Tone::Busy, &words, |ui| {
             if ui.add(parts::small_button(ui, tr!(language, "Cancel"))).clicked() {
                 outbox.send(capture::Command::Cancel);
             }
         });
     } else if let Some(refused) = model.refused.as_ref().filter(|_| stands_over_image(model)) {
-        let words = text!("No capture: {why}", why = refused.why.clone()).say(language);
+        let words = text!("No capture: {why}", why = refused.why.clone()).in_language(language);
         plate_ui(ui, room, Tone::Warning, &words, |_| {});
     }
 }

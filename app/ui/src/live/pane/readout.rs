@@ -44,7 +44,7 @@ fn pixel_ui(ui: &mut Ui, model: &Model, shown: &Shown<'_>, point: ImagePoint, [r
     let far_plane_m = shown.far_plane_m;
     let depth = match shown.images.depth_at(point, far_plane_m) {
         DepthSample::Metres(depth_m) => format!("{depth_m:.3} m"),
-        DepthSample::Far => text!("over {depth} m", depth = format!("{far_plane_m:.2}")).say(language),
+        DepthSample::Far => text!("over {depth} m", depth = format!("{far_plane_m:.2}")).in_language(language),
         DepthSample::Invalid => tr!(language, "none").to_owned(),
     };
     let ImagePoint { column, row } = point;

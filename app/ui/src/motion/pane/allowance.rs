@@ -23,11 +23,11 @@ pub fn allowance_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         });
         return;
     }
-    let said = tr!(
+    let reported = tr!(
         language,
         "The robot is only read. Before the workbench may move it: nobody in its reach, the emergency stop at hand, a low speed"
     );
-    parts::notice_ui(ui, Tone::Busy, said, |ui| {
+    parts::notice_ui(ui, Tone::Busy, reported, |ui| {
         let palette = Palette::of(ui);
         let words = RichText::new(tr!(language, "Let the workbench move it")).color(palette.on_accent);
         if ui.add(Button::new(words).fill(palette.accent)).clicked() {

@@ -90,25 +90,25 @@ fn row_ui(
         for (sign, forward) in [("−", false), ("+", true)] {
             let response =
                 ui.add(hold::button(RichText::new(sign).strong()).min_size(theme::least(ui, 26.0, 24.0)).small());
-            let name = text!("Jog joint {joint} {sign}", joint = joint, sign = sign).say(language);
+            let name = text!("Jog joint {joint} {sign}", joint = joint, sign = sign).in_language(language);
             let enabled = ui.is_enabled();
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, enabled, &name));
             hold.button(ui, &response, Jog::Joint { index, forward });
-            response.on_hover_text(text!("{name}. Hold to move", name = &name).say(language));
+            response.on_hover_text(text!("{name}. Hold to move", name = &name).in_language(language));
         }
         let kind = model.joint_kind(index);
         let shown = |joints: &JointValues| joints[index] * kind.shown_per_si();
         let sent = goal.map(|goal| shown(&goal.joints));
         slider_ui(ui, model, index, live, goal, outbox);
         let here = shown(live);
-        let said = numbers::fixed(here, 1, 7);
-        let caption = text!("Joint {joint} is at", joint = joint).say(language);
-        parts::value_ui(ui, &caption, &format!("{said}{}", kind.unit()), palette.text);
+        let reported = numbers::fixed(here, 1, 7);
+        let caption = text!("Joint {joint} is at", joint = joint).in_language(language);
+        parts::value_ui(ui, &caption, &format!("{reported}{}", kind.unit()), palette.text);
         // The goal only where it is another place.
         if let Some(goal) = sent.filter(|goal| (goal - here).abs() > 0.05) {
-            let caption = text!("Joint {joint} goes to", joint = joint).say(language);
-            let said = format!("→{}{}", numbers::fixed(goal, 1, 6), kind.unit());
-            parts::value_ui(ui, &caption, &said, palette.accent);
+            let caption = text!("Joint {joint} goes to", joint = joint).in_language(language);
+            let reported = format!("→{}{}", numbers::fixed(goal, 1, 6), kind.unit());
+            parts::value_ui(ui, &caption, &reported, palette.accent);
         }
     });
 }
@@ -135,7 +135,7 @@ fn slider_ui(
         JointKind::Revolute => text!("Goal of joint {joint} in degrees", joint = index + 1),
         JointKind::Prismatic => text!("Goal of joint {joint} in millimetres", joint = index + 1),
     };
-    let name = name.say(language);
+    let name = name.in_language(language);
     let enabled = ui.is_enabled();
     response.widget_info(|| WidgetInfo::slider(enabled, chosen, &name));
     live_mark_ui(ui, response.rect, ((here - low) / (high - low)).clamp(0.0, 1.0) as f32);
@@ -155,7 +155,7 @@ fn slider_ui(
         low = format!("{}{}", numbers::fixed(low, 0, 0), kind.unit()),
         high = format!("{}{}", numbers::fixed(high, 0, 0), kind.unit())
     );
-    response.on_hover_text(limits.say(language));
+    response.on_hover_text(limits.in_language(language));
 }
 
 /// A mark over the rail of a slider.

@@ -114,7 +114,7 @@ fn axis_colour(ui: &Ui, axis: Axis) -> Color32 {
 
 fn name(axis: Axis, forward: bool, turn: bool, language: Language) -> String {
     let axis = format!("{}{}", if forward { "+" } else { "−" }, letter(axis));
-    if turn { text!("Turn {axis}", axis = axis) } else { text!("Move {axis}", axis = axis) }.say(language)
+    if turn { text!("Turn {axis}", axis = axis) } else { text!("Move {axis}", axis = axis) }.in_language(language)
 }
 
 fn tooltip(name: &str, frame: JogFrame, key: Key, turn: bool, language: Language) -> String {
@@ -128,5 +128,6 @@ fn tooltip(name: &str, frame: JogFrame, key: Key, turn: bool, language: Language
     };
     let key = if turn { format!("Shift {key}") } else { key.to_owned() };
     let frame = frame_name(frame, language);
-    text!("{name}, axes of: {frame}. Hold to move. Key: {key}", name = name, frame = frame, key = key).say(language)
+    text!("{name}, axes of: {frame}. Hold to move. Key: {key}", name = name, frame = frame, key = key)
+        .in_language(language)
 }

@@ -61,7 +61,7 @@ fn step_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             (JogStep::Hold, tr!(language, "Hold").to_owned(), tr!(language, "Moves as long as it is held").to_owned());
         let steps = STEPS.map(|(mm, deg)| {
             let step = JogStep::Step { metres: mm * 1e-3, radians: deg.to_radians() };
-            (step, format!("{mm}"), text!("Step {mm} mm, {deg}°", mm = mm, deg = deg).say(language))
+            (step, format!("{mm}"), text!("Step {mm} mm, {deg}°", mm = mm, deg = deg).in_language(language))
         });
         for (step, name, what) in Some(hold).filter(|_| can_be_held).into_iter().chain(steps) {
             let chosen = model.jog_step() == step;
@@ -86,15 +86,15 @@ fn speed_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         if response.changed() {
             outbox.send(motion::Command::SetJog(JogSettings { speed: Some(percent / 100.0), ..settings }));
         }
-        let (said, more) = speed_said(model.moves(), percent / 100.0);
+        let (reported, more) = speed_text(model.moves(), percent / 100.0);
         let colour = Palette::of(ui).text;
-        ui.label(RichText::new(said.say(language)).color(colour)).on_hover_text(more.say(language));
+        ui.label(RichText::new(reported.in_language(language)).color(colour)).on_hover_text(more.in_language(language));
     });
 }
 
 /// The speed as far as it is known, and what that means. A controller behind a driver is given a share of its own highest speed, which
 /// nobody has said; a speed of the tip holds for jogging along a line alone.
-fn speed_said(moves: Moves, share: f64) -> (Text, Text) {
+fn speed_text(moves: Moves, share: f64) -> (Text, Text) {
     let percent = format!("{:.0}", share * 100.0);
     if matches!(moves, Moves::OnceArmed { .. }) {
         return (

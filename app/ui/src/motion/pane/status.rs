@@ -23,12 +23,15 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         }
         _ if model.stop_pending => (palette.warning, tr!(language, "Stopping").to_owned()),
         _ if let Some(age) = robot_age(model) => {
-            (palette.weak, text!("Not known whether the arm moves: {age}", age = age).say(language))
+            (palette.weak, text!("Not known whether the arm moves: {age}", age = age).in_language(language))
         }
         Motion::Idle => (palette.good, tr!(language, "The arm is at rest").to_owned()),
         Motion::Moving { what, since_s, .. } => {
             let seconds = format!("{:.0}", (model.now_s - since_s).max(0.0));
-            (palette.busy, text!("Moving: {what} ({seconds} s)", what = what.clone(), seconds = seconds).say(language))
+            (
+                palette.busy,
+                text!("Moving: {what} ({seconds} s)", what = what.clone(), seconds = seconds).in_language(language),
+            )
         }
         Motion::Jogging(_) => (palette.busy, tr!(language, "Jogging").to_owned()),
     };
@@ -52,11 +55,11 @@ pub fn refusal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let Some(message) = model.messages.standing_in(Pane::Jog) else { return };
     let tone = if message.severity == Severity::Error { Tone::Bad } else { Tone::Warning };
-    let said = message.text.say(language);
+    let reported = message.text.in_language(language);
     let close = tr!(language, "Dismiss the message");
     ui.horizontal_top(|ui| {
         let width = ui.available_width() - 32.0;
-        ui.allocate_ui(egui::vec2(width, 0.0), |ui| parts::notice_ui(ui, tone, &said, |_| ()));
+        ui.allocate_ui(egui::vec2(width, 0.0), |ui| parts::notice_ui(ui, tone, &reported, |_| ()));
         if parts::sign_ui(ui, Sign::Cross, close, true).clicked() {
             outbox.send(messages::Command::Dismiss(message.number));
         }
@@ -70,7 +73,7 @@ pub fn tip_ui(ui: &mut Ui, model: &Model) {
     let pose = &robot.base_from_tip;
     let (mut title, mut colour) = (tr!(language, "Tip in base").to_owned(), Palette::of(ui).text);
     if let Some(age) = robot_age(model) {
-        title = format!("{title} · {}", age.say(language));
+        title = format!("{title} · {}", age.in_language(language));
         colour = Palette::of(ui).weak;
     }
     parts::section_with_ui(ui, &title, |ui| {

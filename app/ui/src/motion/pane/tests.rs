@@ -306,8 +306,8 @@ fn a_session_of_an_arm_with_seven_joints_that_is_opened_has_seven_rows() {
     model.robot.as_mut().expect("connected").joints_rad = JointValues::try_from(&kept[..]).expect("seven");
     let pane = driven(model);
     for (joint, angle) in joints.iter().enumerate() {
-        let said = format!("Joint {} is at: {:.1}°", joint + 1, angle.to_degrees()).replace('-', "−");
-        assert!(pane.sees(&said), "{said}");
+        let reported = format!("Joint {} is at: {:.1}°", joint + 1, angle.to_degrees()).replace('-', "−");
+        assert!(pane.sees(&reported), "{reported}");
     }
     assert!(pane.harness.query_by_label("Jog joint 8 +").is_none());
 }

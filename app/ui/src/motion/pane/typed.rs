@@ -105,12 +105,12 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     }
     let goal = typed.goal(model);
     let way = Way::to(&goal, model);
-    let said = match way {
+    let reported = match way {
         Some(_) if !typed.is_edited => text!("These are the numbers of where the arm is: type others"),
-        Some(way) => text!("To there {way}", way = way.said(model)),
+        Some(way) => text!("To there {way}", way = way.text(model)),
         None => text!("Not read yet"),
     };
-    parts::hint_ui(ui, &said.say(language));
+    parts::hint_ui(ui, &reported.in_language(language));
     ui.horizontal(|ui| {
         let reason = if typed.is_tip { blocked.tip } else { blocked.arm };
         if parts::gated_ui(ui, reason, Button::new(tr!(language, "Move there"))).clicked() {
@@ -159,8 +159,9 @@ fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
                 .suffix(unit);
             let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
             edited |= response.changed();
-            let said = text!("{name} of the goal", name = name).say(language);
-            response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
+            let reported = text!("{name} of the goal", name = name).in_language(language);
+            response
+                .widget_info(|| WidgetInfo { label: Some(reported.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
             if index % 3 == 2 {
                 ui.end_row();
             }

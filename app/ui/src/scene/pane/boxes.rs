@@ -22,8 +22,8 @@ const LONGEST_DRAWN_M: f64 = 2.5;
 /// Draws them, and gives their lines of the legend.
 pub fn boxes(canvas: &mut Canvas, keep_out: &KeepOut, language: Language, palette: &Palette) -> Vec<Entry> {
     let mut entries = Vec::new();
-    let standing = keep_out.standing.iter().flat_map(|standing| &standing.obstacles);
-    let mut small = standing.filter(|it| it.size_m.iter().all(|edge_m| *edge_m <= LONGEST_DRAWN_M)).peekable();
+    let scene_obstacles = keep_out.scene_obstacles.iter().flat_map(|scene_obstacles| &scene_obstacles.obstacles);
+    let mut small = scene_obstacles.filter(|it| it.size_m.iter().all(|edge_m| *edge_m <= LONGEST_DRAWN_M)).peekable();
     if small.peek().is_some() {
         entries.push(Entry {
             sign: Sign::Line,

@@ -11,7 +11,7 @@ use super::canvas::Canvas;
 use crate::style::marks::Marks;
 use crate::style::theme::Palette;
 use handeye_workbench::model::Model;
-use handeye_workbench::scene::{BAD_AT_MEDIANS, BoardItem, CaptureItem, Captures, Fixed, Known, Standing};
+use handeye_workbench::scene::{BAD_AT_MEDIANS, BoardItem, CaptureItem, CaptureUse, Captures, Fixed, Known};
 
 /// Length of a frustum [m]: many of them have to stand beside each other.
 const LENGTH_M: f64 = 0.06;
@@ -29,12 +29,12 @@ pub struct Spot {
 /// The colour of a capture: by what it is for, and the nearer to that of a warning the larger its residual is against
 /// the median; in it above the line between good and bad residuals, and when the estimate set it aside, as in the charts.
 fn colour(item: &CaptureItem, line_px: Option<f64>, marks: &Marks, warning: Color32) -> Color32 {
-    match item.standing {
-        Standing::Aside => warning,
-        Standing::Verification => marks.verify,
-        Standing::Excluded => marks.excluded,
-        Standing::Fit if item.rms_px.zip(line_px).is_some_and(|(rms_px, line_px)| rms_px > line_px) => warning,
-        Standing::Fit => {
+    match item.used_as {
+        CaptureUse::Rejected => warning,
+        CaptureUse::Verification => marks.verify,
+        CaptureUse::Excluded => marks.excluded,
+        CaptureUse::Fit if item.rms_px.zip(line_px).is_some_and(|(rms_px, line_px)| rms_px > line_px) => warning,
+        CaptureUse::Fit => {
             let over_median = item.times_median.filter(|times| times.is_finite()).map_or(0.0, |times| times - 1.0);
             marks.fit.lerp_to_gamma(warning, (over_median / (BAD_AT_MEDIANS - 1.0)).clamp(0.0, 1.0) as f32)
         }
@@ -58,10 +58,10 @@ pub fn captures(
         let item = items.item(record);
         let plain = colour(&item, model.outlier_line_px, marks, palette.warning);
         let is_selected = model.selection.contains(&record.id);
-        let (width, colour, strength) = match (is_selected, pointed == Some(record.id), item.standing) {
+        let (width, colour, strength) = match (is_selected, pointed == Some(record.id), item.used_as) {
             (true, ..) => (2.4, plain.lerp_to_gamma(palette.text, 0.45), 0.35),
             (_, true, _) => (2.0, plain.lerp_to_gamma(palette.text, 0.3), 0.25),
-            (.., Standing::Excluded) => (1.0, plain.gamma_multiply(0.7), 0.05),
+            (.., CaptureUse::Excluded) => (1.0, plain.gamma_multiply(0.7), 0.05),
             _ => (1.2, plain, 0.12),
         };
         let place = capture(canvas, known, &base_from_tip, &item, (width, colour, colour.gamma_multiply(strength)));
@@ -111,19 +111,19 @@ mod tests {
     fn the_colour_of_a_capture_tells_its_purpose_and_how_bad_its_residual_is() {
         let marks = Marks::over_images();
         let warning = Color32::from_rgb(240, 176, 64);
-        let of = |standing, times_median: Option<f64>, line_px| {
+        let of = |used_as, times_median: Option<f64>, line_px| {
             let rms_px = times_median.map(|times| 0.2 * times);
-            let item = CaptureItem { base_from_camera: None, standing, rms_px, times_median };
+            let item = CaptureItem { base_from_camera: None, used_as, rms_px, times_median };
             colour(&item, line_px, marks, warning)
         };
-        assert_eq!(of(Standing::Fit, None, None), marks.fit);
-        assert_eq!(of(Standing::Fit, Some(0.5), None), marks.fit);
-        assert_eq!(of(Standing::Fit, Some(10.0), None), warning);
-        let between = of(Standing::Fit, Some(2.0), None);
+        assert_eq!(of(CaptureUse::Fit, None, None), marks.fit);
+        assert_eq!(of(CaptureUse::Fit, Some(0.5), None), marks.fit);
+        assert_eq!(of(CaptureUse::Fit, Some(10.0), None), warning);
+        let between = of(CaptureUse::Fit, Some(2.0), None);
         assert!(between != marks.fit && between != warning);
-        assert_eq!(of(Standing::Fit, Some(1.1), Some(0.2)), warning, "the line of the charts counts here as well");
-        assert_eq!(of(Standing::Verification, Some(10.0), None), marks.verify);
-        assert_eq!(of(Standing::Aside, None, None), warning);
-        assert_eq!(of(Standing::Excluded, Some(10.0), None), marks.excluded);
+        assert_eq!(of(CaptureUse::Fit, Some(1.1), Some(0.2)), warning, "the line of the charts counts here as well");
+        assert_eq!(of(CaptureUse::Verification, Some(10.0), None), marks.verify);
+        assert_eq!(of(CaptureUse::Rejected, None, None), warning);
+        assert_eq!(of(CaptureUse::Excluded, Some(10.0), None), marks.excluded);
     }
 }

@@ -19,7 +19,7 @@ use crate::style::marks::Marks;
 use crate::style::theme::Palette;
 use handeye_wording::text;
 use handeye_workbench::model::Model;
-use handeye_workbench::scene::{BoardItem, CameraItem, Known, Role, Standing, posed_arm};
+use handeye_workbench::scene::{BoardItem, CameraItem, CaptureUse, Known, Role, posed_arm};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -75,7 +75,7 @@ fn capture_entries(
 ) -> impl Iterator<Item = Entry> {
     let kinds = [
         (
-            Standing::Fit,
+            CaptureUse::Fit,
             marks.fit,
             tr!(language, "Captures in the fit"),
             tr!(
@@ -85,25 +85,25 @@ fn capture_entries(
             ),
         ),
         (
-            Standing::Aside,
+            CaptureUse::Rejected,
             palette.warning,
             tr!(language, "Outliers"),
             tr!(language, "Captures that do not fit the others, and which the answer is without"),
         ),
         (
-            Standing::Verification,
+            CaptureUse::Verification,
             marks.verify,
             tr!(language, "Captures for verification"),
             tr!(language, "Captures that are not in the fit and verify it"),
         ),
         (
-            Standing::Excluded,
+            CaptureUse::Excluded,
             marks.excluded,
             tr!(language, "Excluded captures"),
             tr!(language, "Captures that were taken out by hand"),
         ),
     ];
-    kinds.into_iter().filter(|(standing, ..)| table.count(*standing) > 0).map(|(_, colour, name, what)| Entry {
+    kinds.into_iter().filter(|(used_as, ..)| table.count(*used_as) > 0).map(|(_, colour, name, what)| Entry {
         sign: Sign::Frustum,
         colour,
         name: name.to_owned(),
@@ -115,13 +115,13 @@ fn grid_entry(palette: &Palette, language: Language) -> Entry {
     Entry {
         sign: Sign::Grid,
         colour: palette.weak,
-        name: text!("Grid: {spacing} mm", spacing = SPACING_MM).say(language),
+        name: text!("Grid: {spacing} mm", spacing = SPACING_MM).in_language(language),
         what: text!(
             "The plane z = 0 of the base; its lines are {spacing} mm apart, the stronger ones 500 mm. Axes: x red, y green, \
              z blue.",
             spacing = SPACING_MM
         )
-        .say(language),
+        .in_language(language),
     }
 }
 
@@ -165,7 +165,7 @@ fn boards(
                 let what = tr!(language, "The board where tracking has it now");
                 (Sign::Board, marks.predicted, tr!(language, "Board, tracked"), what)
             }
-            Role::Predictor | Role::Said => {
+            Role::Predictor | Role::Reported => {
                 let sign = if has_pattern {
                     board::outlined(canvas, &pose, target, (1.2, palette.weak), Line::Solid);
                     Sign::Line

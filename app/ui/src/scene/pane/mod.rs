@@ -132,10 +132,10 @@ fn room_ui(ui: &mut Ui, room: Rect, model: &Model, table: &CaptureTable, outbox:
     canvas.paint(ui.painter());
     legend::legend_ui(ui, room, &drawn.entries);
     if let Some(age) = robot_age(model).filter(|_| model.robot.is_some()) {
-        let words = text!("Robot: {age}", age = age).say(language);
+        let words = text!("Robot: {age}", age = age).in_language(language);
         let plate = marks::plate(ui.painter(), room.min + Vec2::splat(INSET), &words, Marks::over_images().review);
-        let said = ui.interact(plate, ui.id().with("age"), Sense::hover());
-        said.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, &words));
+        let reported = ui.interact(plate, ui.id().with("age"), Sense::hover());
+        reported.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, &words));
     }
     let now = spots_ui(ui, room, model, table, &drawn.spots, outbox);
     if now != pointed {
@@ -185,9 +185,9 @@ fn spots_ui(
         let place = Rect::from_center_size(spot.at, Vec2::splat(2.0 * GRASP)).intersect(room);
         let response = ui.interact(place, ui.id().with(("capture", spot.id)), Sense::CLICK);
         let selected = model.selection.contains(&spot.id);
-        let name = text!("Capture {name}", name = row.title()).say(language);
+        let name = text!("Capture {name}", name = row.title()).in_language(language);
         response.widget_info(|| {
-            let label = text!("{capture} in 3D", capture = &name).say(language);
+            let label = text!("{capture} in 3D", capture = &name).in_language(language);
             WidgetInfo::selected(WidgetType::SelectableLabel, true, selected, label)
         });
         if response.hovered() {
@@ -199,11 +199,11 @@ fn spots_ui(
         response.on_hover_ui_at_pointer(|ui| {
             ui.label(RichText::new(&name).strong());
             ui.label(match row.rms_px {
-                Some(rms_px) => text!("residual {rms} px", rms = format!("{rms_px:.3}")).say(language),
+                Some(rms_px) => text!("residual {rms} px", rms = format!("{rms_px:.3}")).in_language(language),
                 None => tr!(language, "not in a calibration yet").to_owned(),
             });
             let mm = crate::style::numbers::row((spot.taken_m.coords * 1e3).as_slice(), 1, 0);
-            ui.label(text!("taken from {mm} mm in the base", mm = mm).say(language));
+            ui.label(text!("taken from {mm} mm in the base", mm = mm).in_language(language));
         });
     }
     pointed

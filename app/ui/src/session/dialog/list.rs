@@ -31,7 +31,7 @@ pub fn recent_ui(ui: &mut Ui, model: &Model, state: &mut State, outbox: &mut Out
         let path = recent.folder.display().to_string();
         ui.horizontal(|ui| {
             let response = ui.selectable_label(state.typed == path, name.as_ref()).on_hover_text(&path);
-            let captures = text!("{count} {count|capture|captures}", count = recent.captures).say(language);
+            let captures = text!("{count} {count|capture|captures}", count = recent.captures).in_language(language);
             parts::caption_ui(ui, &captures);
             if response.clicked() {
                 (state.selected, state.is_chosen) = (None, true);
@@ -89,8 +89,8 @@ fn entry_ui(
     ui.horizontal(|ui| {
         let mark = mark(entry.kind, language);
         let response = ui.selectable_label(is_selected, &entry.name);
-        let said = if mark.is_empty() { entry.name.clone() } else { format!("{}, {mark}", entry.name) };
-        response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_selected, &said));
+        let reported = if mark.is_empty() { entry.name.clone() } else { format!("{}, {mark}", entry.name) };
+        response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, is_selected, &reported));
         if response.clicked() {
             if purpose.is_named() && entry.kind != FolderKind::File {
                 go(purpose, state, folder.join(&entry.name), outbox);

@@ -159,7 +159,7 @@ fn trouble(model: &Model, state: &State) -> Option<String> {
     let asked = state.asked.as_ref()?;
     let message = model.messages.iter().rev().find(|message| message.severity == Severity::Error)?;
     let is_later = asked.before.is_none_or(|before| message.number > before);
-    is_later.then(|| message.text.say(model.view.language))
+    is_later.then(|| message.text.in_language(model.view.language))
 }
 
 fn path_ui(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, is_new: bool, outbox: &mut Outbox) {
@@ -191,8 +191,9 @@ fn path_ui(ui: &mut Ui, model: &Model, purpose: &Purpose, state: &mut State, is_
 
 fn trouble_ui(ui: &mut Ui, model: &Model, state: &State) {
     if let Some(Err(why)) = model.folder.as_ref().map(|listing| &listing.entries) {
-        let said = handeye_wording::text!("The folder cannot be read: {why}", why = why).say(model.view.language);
-        parts::notice_ui(ui, Tone::Warning, &said, |_| ());
+        let reported =
+            handeye_wording::text!("The folder cannot be read: {why}", why = why).in_language(model.view.language);
+        parts::notice_ui(ui, Tone::Warning, &reported, |_| ());
     }
     if model.opening {
         parts::hint_ui(ui, tr!(model.view.language, "Just a moment…"));

@@ -1,8 +1,8 @@
 //! The expected error by number of poses: how it fell, how it will fall, and where the goal is.
 
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, WidgetInfo, WidgetType};
-use handeye_estimate::claim::Claim;
 use handeye_estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
+use handeye_estimate::stated_uncertainty::StatedUncertainty;
 
 use super::axes::{self, Scale};
 use super::instead_ui;
@@ -18,7 +18,7 @@ use handeye_workbench::tr;
 pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
     let language = model.view.language;
     let calibration = model.solve.solved.as_ref().map(|solved| &solved.calibration);
-    if calibration.is_some_and(|calibration| *calibration.claim() != Claim::AsModelled) {
+    if calibration.is_some_and(|calibration| *calibration.stated_uncertainty() != StatedUncertainty::AsModelled) {
         // The curve is that of the noise alone.
         instead_ui(ui, tr!(language, "More poses do not help until what was found is corrected"));
         return;
@@ -29,7 +29,7 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
         return;
     };
     let goal_mm = model.view.goal.0 * 1e3;
-    ui.label(RichText::new(verdict(curve, now, goal_mm).say(language)).color(Palette::of(ui).text));
+    ui.label(RichText::new(verdict(curve, now, goal_mm).in_language(language)).color(Palette::of(ui).text));
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);
     let chart = Chart::new(curve, axes::plot_rect(room), goal_mm, planned(model, now));
@@ -114,7 +114,7 @@ impl Chart {
         let goal_y = axes::y(self.plot, self.scale, goal_mm);
         let goal_line = [Pos2::new(self.plot.left(), goal_y), Pos2::new(self.plot.right(), goal_y)];
         painter.extend(Shape::dashed_line(&goal_line, Stroke::new(1.5, palette.good), 6.0, 4.0));
-        let words = text!("Goal {goal} mm", goal = format!("{goal_mm:.2}")).say(language);
+        let words = text!("Goal {goal} mm", goal = format!("{goal_mm:.2}")).in_language(language);
         let at = Pos2::new(self.plot.right() - 4.0, goal_y - 2.0);
         painter.text(at, Align2::RIGHT_BOTTOM, words, FontId::proportional(CAPTION), palette.good);
 
@@ -142,7 +142,7 @@ impl Chart {
         }
         painter.circle_filled(here, 5.0, colour);
         painter.circle_stroke(here, 5.0, Stroke::new(1.5, palette.card));
-        let words = text!("Now {error} mm", error = numbers::error_mm(now.1)).say(language);
+        let words = text!("Now {error} mm", error = numbers::error_mm(now.1)).in_language(language);
         let at = here + egui::vec2(7.0, -7.0);
         painter.text(at, Align2::LEFT_BOTTOM, words, FontId::proportional(CAPTION), palette.text);
     }
@@ -167,6 +167,6 @@ impl Chart {
         } else {
             text!("The first {views} poses: {error} mm", views = point.views, error = error)
         };
-        response.on_hover_text_at_pointer(words.say(language));
+        response.on_hover_text_at_pointer(words.in_language(language));
     }
 }

@@ -91,7 +91,7 @@ fn controls_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         let Some(line_px) = model.outlier_line_px else { return };
         let ids = above(table, line_px);
         let left = table.rows.iter().filter(|row| !row.excluded && !row.verifies()).count() - ids.len();
-        let words = text!("Exclude {count} above the line", count = ids.len()).say(language);
+        let words = text!("Exclude {count} above the line", count = ids.len()).in_language(language);
         let listed = ids.iter().take(20).map(ToString::to_string).collect::<Vec<_>>().join(", ");
         let more = if ids.len() > 20 { "…" } else { "" };
         let what = text!(
@@ -101,7 +101,7 @@ fn controls_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Ou
         );
         let none = tr!(language, "No capture of the fit is above the line");
         let button = ui.add_enabled(!ids.is_empty(), egui::Button::new(words));
-        if button.on_hover_text(what.say(language)).on_disabled_hover_text(none).clicked() {
+        if button.on_hover_text(what.in_language(language)).on_disabled_hover_text(none).clicked() {
             outbox.send(session::Command::SetExcluded { ids, excluded: true });
         }
     });
@@ -178,7 +178,7 @@ impl Bars {
             (false, false) if row.is_aside() => tr!(language, "outlier"),
             (false, false) => tr!(language, "in the fit"),
         };
-        format!("{}\n{} {value}\n{what}", text!("Capture {name}", name = row.title()).say(language), self.name)
+        format!("{}\n{} {value}\n{what}", text!("Capture {name}", name = row.title()).in_language(language), self.name)
     }
 }
 

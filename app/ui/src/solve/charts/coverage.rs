@@ -19,7 +19,8 @@ pub fn coverage_ui(ui: &mut Ui, model: &Model, table: &CaptureTable) {
         return;
     };
     let covered = format!("{:.0}", coverage.covered() * 100.0);
-    let words = text!("Corners in {covered} % of the cells of the image, in pixels", covered = covered).say(language);
+    let words =
+        text!("Corners in {covered} % of the cells of the image, in pixels", covered = covered).in_language(language);
     ui.label(RichText::new(words).color(palette.text));
     ui.horizontal(|ui| legend::legend_ui(ui, table, language));
 
@@ -79,6 +80,6 @@ pub fn coverage_ui(ui: &mut Ui, model: &Model, table: &CaptureTable) {
             0 => text!("No corner was ever seen here: bring the board there"),
             count => text!("{count} {count|corner|corners} seen here", count = count),
         };
-        response.on_hover_text_at_pointer(words.say(language));
+        response.on_hover_text_at_pointer(words.in_language(language));
     }
 }

@@ -5,7 +5,7 @@ use egui::{RichText, Sense, Ui, Vec2};
 use crate::capture::rows::CaptureTable;
 use crate::style::marks::Marks;
 use crate::style::theme::{CAPTION, Palette};
-use handeye_workbench::scene::Standing;
+use handeye_workbench::scene::CaptureUse;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
@@ -16,13 +16,13 @@ const SQUARE: f32 = 9.0;
 pub fn legend_ui(ui: &mut Ui, table: &CaptureTable, language: Language) {
     let (palette, marks) = (Palette::of(ui), Marks::of(ui));
     ui.spacing_mut().item_spacing.x = 5.0;
-    for (standing, colour, name) in [
-        (Standing::Fit, marks.fit, tr!(language, "in the fit")),
-        (Standing::Aside, palette.warning, tr!(language, "outlier")),
-        (Standing::Verification, marks.verify, tr!(language, "for verification")),
-        (Standing::Excluded, marks.excluded, tr!(language, "excluded")),
+    for (used_as, colour, name) in [
+        (CaptureUse::Fit, marks.fit, tr!(language, "in the fit")),
+        (CaptureUse::Rejected, palette.warning, tr!(language, "outlier")),
+        (CaptureUse::Verification, marks.verify, tr!(language, "for verification")),
+        (CaptureUse::Excluded, marks.excluded, tr!(language, "excluded")),
     ] {
-        if table.count(standing) > 0 {
+        if table.count(used_as) > 0 {
             let (square, _) = ui.allocate_exact_size(Vec2::splat(SQUARE), Sense::hover());
             ui.painter().rect_filled(square, 2.0, colour);
             ui.label(RichText::new(name).size(CAPTION).color(palette.weak));

@@ -1,9 +1,9 @@
 //! Where the camera is, how far off that may be, and how far off it is where the truth is known.
 
 use egui::{RichText, Ui};
-use handeye_estimate::claim::Claim;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::SmallSample;
+use handeye_estimate::stated_uncertainty::StatedUncertainty;
 
 use super::figures::{self, Within95};
 use crate::style::numbers;
@@ -47,7 +47,8 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
     // With something found that is not in the model the covariance is no error of the answer.
     let covariance = solved.calibration.hand_eye_covariance();
-    let covariance_withheld = covariance.is_some() && *solved.calibration.claim() != Claim::AsModelled;
+    let covariance_withheld =
+        covariance.is_some() && *solved.calibration.stated_uncertainty() != StatedUncertainty::AsModelled;
     let covariance = covariance.filter(|_| !covariance_withheld);
     let within = covariance.map(|c| Within95::new(&pose, c, law));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);
@@ -103,6 +104,6 @@ pub fn truth_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     };
     ui.horizontal(|ui| {
         parts::dot_ui(ui, colour);
-        ui.add(egui::Label::new(RichText::new(verdict.say(language)).color(palette.text)).wrap());
+        ui.add(egui::Label::new(RichText::new(verdict.in_language(language)).color(palette.text)).wrap());
     });
 }

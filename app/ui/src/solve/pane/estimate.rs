@@ -15,10 +15,10 @@ pub fn estimate_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     }
     parts::section_ui(ui, tr!(language, "What the estimate found out"));
     for line in lines {
-        parts::stated_ui(ui, &line.what.say(language), &line.value.say(language))
-            .on_hover_text(line.meaning.say(language));
+        parts::stated_ui(ui, &line.what.in_language(language), &line.value.in_language(language))
+            .on_hover_text(line.meaning.in_language(language));
         if let Some(why) = line.why {
-            parts::caption_ui(ui, &why.say(language));
+            parts::caption_ui(ui, &why.in_language(language));
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Numbers of the pane that the result does not hold itself.
 
-use handeye_estimate::claim::Claim;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::SmallSample;
+use handeye_estimate::stated_uncertainty::StatedUncertainty;
 use handeye_geometry::frames::{Camera, Mount, Pose};
 use handeye_geometry::point_error;
 use handeye_geometry::se3;
@@ -57,7 +57,10 @@ pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
         let point = joint.reference_point;
         (found.isometry().transform_point(&point) - truth.isometry().transform_point(&point)).norm()
     });
-    let stated = solved.calibration.hand_eye_covariance().filter(|_| *solved.calibration.claim() == Claim::AsModelled);
+    let stated = solved
+        .calibration
+        .hand_eye_covariance()
+        .filter(|_| *solved.calibration.stated_uncertainty() == StatedUncertainty::AsModelled);
     let is_within = stated.and_then(|covariance| {
         let error = se3::log((found.inverse() * truth).isometry());
         let weighted = Cholesky::new(*covariance)?.solve(&error);

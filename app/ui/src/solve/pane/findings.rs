@@ -35,8 +35,8 @@ fn finding_ui(ui: &mut Ui, finding: &Finding, language: Language) {
         ui.vertical(|ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
             ui.label(RichText::new(severity).small().color(colour));
-            let said = finding.text.say(language);
-            ui.add(Label::new(RichText::new(said).color(palette.text)).wrap());
+            let reported = finding.text.in_language(language);
+            ui.add(Label::new(RichText::new(reported).color(palette.text)).wrap());
             let numbers = evidence::line(finding, language);
             if !numbers.is_empty() {
                 parts::caption_ui(ui, &numbers);

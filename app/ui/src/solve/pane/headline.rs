@@ -60,7 +60,7 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
                     moved = moved,
                     rest = rest
                 );
-                ui.add(Label::new(RichText::new(words.say(language)).color(palette.tone(Tone::Warning))).wrap());
+                ui.add(Label::new(RichText::new(words.in_language(language)).color(palette.tone(Tone::Warning))).wrap());
             }
             if let Some(error_mm) = error_mm {
                 let verdict = if error_mm <= goal_mm {

@@ -77,7 +77,7 @@ fn row_ui(ui: &mut Ui, name: &str, answer: Option<&Pose<Mount, Camera>>, solved:
             ui.label("–");
             ui.label("–");
             ui.label(RichText::new(tr!(language, "no answer")).small().color(palette.warning))
-                .on_hover_text(Text::from(error).say(language));
+                .on_hover_text(Text::from(error).in_language(language));
         }
     }
 }

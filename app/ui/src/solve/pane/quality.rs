@@ -1,7 +1,7 @@
 //! The camera, the noise levels, and residuals, which are called what they are.
 
 use egui::Ui;
-use handeye_estimate::resolution::{angle_said, place_said};
+use handeye_estimate::resolution::{angle_text, place_text};
 
 use crate::style::numbers;
 use crate::style::parts;
@@ -47,12 +47,12 @@ pub fn noise_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
         stated(
             ui,
             tr!(language, "Robot position"),
-            quality.robot_sigma_mm.map(|mm| place_said(mm * 1e-3).say(language)),
+            quality.robot_sigma_mm.map(|mm| place_text(mm * 1e-3).in_language(language)),
         );
         stated(
             ui,
             tr!(language, "Robot rotation"),
-            quality.robot_sigma_deg.map(|deg| angle_said(deg.to_radians()).say(language)),
+            quality.robot_sigma_deg.map(|deg| angle_text(deg.to_radians()).in_language(language)),
         );
     }
     parts::section_ui(ui, tr!(language, "Residuals (not accuracy)"));

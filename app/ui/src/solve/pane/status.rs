@@ -19,7 +19,8 @@ pub fn status_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     match &model.solve.status {
         SolveStatus::Running { stage, part, since_s, .. } => running_ui(ui, model, *stage, *part, *since_s, outbox),
         SolveStatus::Failed { why } => {
-            let text = text!("There is no answer for the present captures. {why}", why = why.clone()).say(language);
+            let text =
+                text!("There is no answer for the present captures. {why}", why = why.clone()).in_language(language);
             parts::notice_ui(ui, Tone::Bad, &text, |ui| again_ui(ui, language, outbox));
         }
         SolveStatus::Cancelled => {
@@ -34,7 +35,7 @@ fn running_ui(ui: &mut Ui, model: &Model, stage: Stage, part: f64, since_s: f64,
     let language = model.view.language;
     let seconds = (model.now_s - since_s).max(0.0) as u64;
     let doing = stage_name(stage, language);
-    let text = text!("Solving for {seconds} s: {doing}", seconds = seconds, doing = doing).say(language);
+    let text = text!("Solving for {seconds} s: {doing}", seconds = seconds, doing = doing).in_language(language);
     if parts::progress_ui(ui, part as f32, &text, tr!(language, "Cancel solving")) {
         outbox.send(solve::Command::Cancel);
     }
@@ -59,7 +60,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 count = count
             )
         };
-        parts::empty_ui(ui, tr!(language, "No calibration yet"), &detail.say(language));
+        parts::empty_ui(ui, tr!(language, "No calibration yet"), &detail.in_language(language));
         ui.vertical_centered(|ui| {
             let reason = (count < MIN_VIEWS).then(|| {
                 if has_robot {
@@ -82,7 +83,7 @@ fn idle_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                 time = seconds(solved.took_s)
             );
             let weak = Palette::of(ui).weak;
-            ui.label(RichText::new(how.say(language)).color(weak));
+            ui.label(RichText::new(how.in_language(language)).color(weak));
             if ui.button(tr!(language, "Solve again")).clicked() {
                 outbox.send(solve::Command::Solve);
             }

@@ -1,9 +1,9 @@
-use handeye_estimate::claim::Claim;
 use handeye_estimate::diagnose::doctor;
 use handeye_estimate::diagnose::findings::{self, FindingCode, FindingOptions};
 use handeye_estimate::handeye::screening::Distance;
 use handeye_estimate::handeye::{HandEyeError, Mode};
-use handeye_estimate::uncertainty::widening::{Evidence, Widening};
+use handeye_estimate::stated_uncertainty::StatedUncertainty;
+use handeye_estimate::uncertainty::overdispersion::{Evidence, Overdispersion};
 use handeye_estimate::{CameraKnowledge, Observations, ObservedView, ShapeEstimate, ViewStatus};
 use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::{CancelToken, Stage};
@@ -112,7 +112,7 @@ fn the_camera_in_the_tip_is_in_millimetres_with_its_uncertainty() {
 #[test]
 fn with_something_found_no_uncertainty_is_stated_for_an_axis_and_the_reason_is_not_the_method() {
     let pane = driven(sample::with_answer(|solved| {
-        solved.calibration = solved.calibration.clone().claiming(Claim::Moved(Vec::new()));
+        solved.calibration = solved.calibration.clone().claiming(StatedUncertainty::Moved(Vec::new()));
     }));
     assert!(pane.sees("With what was found below no ± can be stated for each axis."));
     assert!(!pane.sees("A closed form states no uncertainty.") && !pane.sees("± 95 % [mm]"));
@@ -183,7 +183,7 @@ fn with_everything_found(calibration: &mut handeye_estimate::diagnose::Calibrati
         warp_sigma_m: Some([3e-5, 2e-5]),
         scale_sigma: None,
     });
-    joint.widening = Widening { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
+    joint.widening = Overdispersion { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
     joint.small_sample.level_sigma = [0.1, 0.8, 0.9];
     joint.noise.view_px = 0.12;
     // What a robot shows: less is below what any resolves, and nothing is said of it.
@@ -335,12 +335,12 @@ fn every_finding_is_said_in_both_languages_with_its_numbers() {
     let found = every_finding();
     let codes: BTreeSet<FindingCode> = found.iter().map(|finding| finding.code).collect();
     assert_eq!(codes.len(), 22, "{codes:?}");
-    found.iter().for_each(is_said_in_both_languages);
+    found.iter().for_each(is_translated_in_both_languages);
 }
 
-fn is_said_in_both_languages(finding: &findings::Finding) {
-    assert_eq!(finding.text.say(Language::English), finding.to_record().text);
-    let chinese = finding.text.say(Language::Chinese);
+fn is_translated_in_both_languages(finding: &findings::Finding) {
+    assert_eq!(finding.text.in_language(Language::English), finding.to_record().text);
+    let chinese = finding.text.in_language(Language::Chinese);
     // What is left of Latin words are names of files, methods, frames, units and axes.
     let kept =
         "images png tsai lenz park martin horaud andreff daniilidis shah li base from tip mm m px x y z w e ChArUco";
@@ -373,7 +373,7 @@ fn what_the_doctor_says_of_a_session_is_said_in_both_languages() {
     let codes: BTreeSet<FindingCode> = found.iter().map(|finding| finding.code).collect();
     assert!(codes.contains(&FindingCode::InvertedPoses) || codes.contains(&FindingCode::WrongMode), "{codes:?}");
     assert!(codes.contains(&FindingCode::WrongLengthUnit) && codes.contains(&FindingCode::NotFinite), "{codes:?}");
-    found.iter().for_each(is_said_in_both_languages);
+    found.iter().for_each(is_translated_in_both_languages);
 }
 
 #[test]

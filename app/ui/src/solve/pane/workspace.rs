@@ -44,7 +44,7 @@ pub fn workspace_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         outbox.send(solve::Command::SetTipBox(Some(wanted)));
     }
     stated_ui(ui, tr!(language, "Worst, 95 %"), error.worst_m, language).on_hover_text(
-        text!("At {place} mm in the base", place = place_mm(error.worst_at.coords.into())).say(language),
+        text!("At {place} mm in the base", place = place_mm(error.worst_at.coords.into())).in_language(language),
     );
     stated_ui(ui, tr!(language, "Mean, 95 %"), error.mean_m, language);
 }
@@ -64,9 +64,10 @@ fn corner_ui(ui: &mut Ui, is_from: bool, corner_m: &mut [f64; 3], language: Lang
             // Half a number is no place.
             .update_while_editing(false);
         let response = ui.add_sized([FIELD, ui.spacing().interact_size.y], field);
-        let said = if is_from { text!("Box from {axis}", axis = axis) } else { text!("Box to {axis}", axis = axis) };
-        let said = said.say(language);
-        response.widget_info(|| WidgetInfo { label: Some(said.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
+        let reported =
+            if is_from { text!("Box from {axis}", axis = axis) } else { text!("Box to {axis}", axis = axis) };
+        let reported = reported.in_language(language);
+        response.widget_info(|| WidgetInfo { label: Some(reported.clone()), ..WidgetInfo::new(WidgetType::DragValue) });
         if response.changed() {
             *metres = mm * 1e-3;
         }

@@ -48,14 +48,14 @@ fn elsewhere_ui(ui: &mut Ui, model: &Model, here: usize, outbox: &mut Outbox) {
         return;
     }
     if model.cell.is_none() {
-        let said = text!("{n} taught {n|pose is|poses are} shown once the arm is connected", n = count);
-        return parts::hint_ui(ui, &said.say(language));
+        let reported = text!("{n} taught {n|pose is|poses are} shown once the arm is connected", n = count);
+        return parts::hint_ui(ui, &reported.in_language(language));
     }
-    let said = text!(
+    let reported = text!(
         "{n} {n|pose was|poses were} taught with another arm, base or target, and the arm is not sent there",
         n = count
     );
-    parts::notice_ui(ui, Tone::Busy, &said.say(language), |ui| {
+    parts::notice_ui(ui, Tone::Busy, &reported.in_language(language), |ui| {
         let what = tr!(
             language,
             "Only where arm, base and target stand as they did: the arm goes to the same places in its own base"

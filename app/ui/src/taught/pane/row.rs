@@ -42,26 +42,26 @@ pub fn row_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, p
     let row = ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         let name = &pose.name;
-        let grip = text!("Drag {name} to another place", name = name).say(language);
+        let grip = text!("Drag {name} to another place", name = name).in_language(language);
         let is_free = !model.sequence_runs;
         parts::sign_ui(ui, Sign::Grip, &grip, is_free).dnd_set_drag_payload(Dragged(index));
         parts::dot_ui(ui, mark.colour(ui));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let remove = text!("Remove {name}", name = name).say(language);
+            let remove = text!("Remove {name}", name = name).in_language(language);
             if parts::sign_ui(ui, Sign::Cross, &remove, is_free).clicked() {
                 outbox.send(taught::Command::Remove(name.clone()));
             }
-            let later = text!("Move {name} down", name = name).say(language);
+            let later = text!("Move {name} down", name = name).in_language(language);
             if parts::sign_ui(ui, Sign::Down, &later, is_free && index + 1 < count).clicked() {
                 outbox.send(taught::Command::Reorder { name: name.clone(), to: index + 1 });
             }
-            let earlier = text!("Move {name} up", name = name).say(language);
+            let earlier = text!("Move {name} up", name = name).in_language(language);
             if parts::sign_ui(ui, Sign::Up, &earlier, is_free && index > 0).clicked() {
                 outbox.send(taught::Command::Reorder { name: name.clone(), to: index.saturating_sub(1) });
             }
             let button = parts::small_button(ui, tr!(language, "Go to"));
             let go = parts::gated_ui(ui, immovable(model), button);
-            let go_name = text!("Go to {name}", name = name).say(language);
+            let go_name = text!("Go to {name}", name = name).in_language(language);
             let can_go = immovable(model).is_none();
             go.widget_info(|| WidgetInfo::labeled(WidgetType::Button, can_go, &go_name));
             if go.clicked() {
@@ -72,7 +72,7 @@ pub fn row_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, p
         });
     });
     if let Mark::Skipped(why) = &mark {
-        parts::caption_ui(ui, &text!("Skipped: {why}", why = why.clone()).say(language));
+        parts::caption_ui(ui, &text!("Skipped: {why}", why = why.clone()).in_language(language));
     }
     drop_ui(ui, poses, index, row.response.rect, outbox);
 }
@@ -104,7 +104,7 @@ fn kind_ui(ui: &mut Ui, pose: &TaughtPose, model: &Model) {
     let language = model.view.language;
     let (kind, numbers) = match &pose.goal {
         Goal::Joints(joints) => {
-            (tr!(language, "joints"), text!("Joints: {values}", values = model.joints_said(joints)))
+            (tr!(language, "joints"), text!("Joints: {values}", values = model.joints_text(joints)))
         }
         Goal::Tip(base_from_tip) => {
             let mm = numbers::translation_mm(base_from_tip);
@@ -115,7 +115,7 @@ fn kind_ui(ui: &mut Ui, pose: &TaughtPose, model: &Model) {
     };
     let weak = Palette::of(ui).weak;
     ui.add(egui::Label::new(RichText::new(kind).small().color(weak)).sense(Sense::hover()))
-        .on_hover_text(numbers.say(language));
+        .on_hover_text(numbers.in_language(language));
 }
 
 /// The name, which is edited where it stands.
@@ -135,7 +135,7 @@ fn name_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose
         .frame(egui::Frame::NONE)
         .text_color(if taken { palette.bad } else { palette.text });
     let mut response = ui.add_enabled(!model.sequence_runs, field);
-    let name = text!("Name of pose {n}", n = index + 1).say(language);
+    let name = text!("Name of pose {n}", n = index + 1).in_language(language);
     let enabled = !model.sequence_runs;
     response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, enabled, &name));
     if taken {

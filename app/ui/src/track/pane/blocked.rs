@@ -65,7 +65,7 @@ pub fn is_following(model: &Model) -> bool {
     let track = &model.track;
     match track.follow {
         FollowStatus::Following { .. } | FollowStatus::MakingRoom | FollowStatus::Waiting => true,
-        FollowStatus::Off => track.wish.is_some(),
+        FollowStatus::Off => track.request.is_some(),
         FollowStatus::Ended(_) => false,
     }
 }

@@ -7,7 +7,7 @@ use crate::style::theme::{Palette, Tone};
 use crate::style::{form, parts};
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
-use handeye_workbench::model::{FollowStatus, FollowWish, Model};
+use handeye_workbench::model::{FollowRequest, FollowStatus, Model};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::track;
@@ -33,13 +33,13 @@ impl Default for Choice {
 }
 
 impl Choice {
-    fn wish(self) -> FollowWish {
+    fn request(self) -> FollowRequest {
         if self.to_corner {
-            FollowWish::Corner { index: self.corner.saturating_sub(1), stand_off_m: self.stand_off_mm * 1e-3 }
+            FollowRequest::Corner { index: self.corner.saturating_sub(1), stand_off_m: self.stand_off_mm * 1e-3 }
         } else if self.with_room {
-            FollowWish::KeepViewWithRoom
+            FollowRequest::KeepViewWithRoom
         } else {
-            FollowWish::KeepView
+            FollowRequest::KeepView
         }
     }
 }
@@ -62,7 +62,7 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
         } else {
             let button = Button::new(tr!(language, "Follow"));
             if parts::gated_ui(ui, blocked.follow, button).clicked() {
-                outbox.send(track::Command::SetFollow(Some(choice.wish())));
+                outbox.send(track::Command::SetFollow(Some(choice.request())));
             }
         }
         status_ui(ui, model, follows);
@@ -71,7 +71,7 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
         parts::hint_ui(ui, reason);
     }
     if let FollowStatus::Ended(why) = &model.track.follow {
-        let words = text!("The arm does not follow the board: {why}", why = why.clone()).say(language);
+        let words = text!("The arm does not follow the board: {why}", why = why.clone()).in_language(language);
         let again = parts::notice_ui(ui, Tone::Warning, &words, |ui| {
             let what = tr!(language, "Follows as chosen above, from where the arm stands");
             parts::gated_ui(ui, blocked.follow, Button::new(tr!(language, "Follow again")))
@@ -79,7 +79,7 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
                 .clicked()
         });
         if again {
-            outbox.send(track::Command::SetFollow(Some(choice.wish())));
+            outbox.send(track::Command::SetFollow(Some(choice.request())));
         }
     }
 }
@@ -122,7 +122,7 @@ fn choice_ui(ui: &mut Ui, model: &Model, choice: &mut Choice) {
             row = row,
             column = column
         );
-        number_ui(ui, tr!(language, "Corner to go to"), corner, field).on_hover_text(what.say(language));
+        number_ui(ui, tr!(language, "Corner to go to"), corner, field).on_hover_text(what.in_language(language));
         ui.label(RichText::new(tr!(language, "at")).color(Palette::of(ui).weak));
         let stand_off_mm = choice.stand_off_mm;
         let field =
@@ -170,7 +170,7 @@ fn status_ui(ui: &mut Ui, model: &Model, follows: bool) {
 
 fn following(distance_m: f64, angle_rad: f64, is_kept_off: bool, language: Language) -> String {
     let (distance, angle) = (format!("{:.1}", distance_m * 1e3), format!("{:.2}", angle_rad.to_degrees()));
-    let said = if is_kept_off {
+    let reported = if is_kept_off {
         text!(
             "Keeping clear of an obstacle: {distance} mm and {angle}° from the goal",
             distance = distance,
@@ -179,5 +179,5 @@ fn following(distance_m: f64, angle_rad: f64, is_kept_off: bool, language: Langu
     } else {
         text!("Following: {distance} mm and {angle}° from the goal", distance = distance, angle = angle)
     };
-    said.say(language)
+    reported.in_language(language)
 }

@@ -138,7 +138,7 @@ fn hover_ui(ui: &Ui, plot: Rect, response: &egui::Response, curves: &[Curve], la
     let Some(pointer) = response.hover_pos().filter(|at| plot.contains(*at)) else { return };
     let ago_s = f64::from((plot.right() - pointer.x) / plot.width()) * WINDOW_S;
     ui.painter().vline(pointer.x, plot.y_range(), Stroke::new(1.0, Palette::of(ui).weak));
-    let mut lines = vec![text!("{time} s ago", time = format!("{ago_s:.1}")).say(language)];
+    let mut lines = vec![text!("{time} s ago", time = format!("{ago_s:.1}")).in_language(language)];
     for curve in curves {
         let nearest = curve.values().min_by(|(a, _), (b, _)| (a - ago_s).abs().total_cmp(&(b - ago_s).abs()));
         if let Some((_, value)) = nearest.filter(|(at_s, _)| (at_s - ago_s).abs() < GAP_S) {

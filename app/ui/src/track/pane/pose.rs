@@ -106,7 +106,7 @@ fn newest_image_ui(ui: &mut Ui, update: &Update, language: Language) {
             rms = format!("{:.2}", seen.rms_px)
         );
         parts::stated_ui(ui, tr!(language, "By corners [mm]"), &position(&seen.base_from_target))
-            .on_hover_text(what.say(language));
+            .on_hover_text(what.in_language(language));
     }
     let Some(by_depth) = &update.by_depth else {
         parts::hint_ui(ui, tr!(language, "The image has no depth at enough corners to compare with."));
@@ -118,7 +118,7 @@ fn newest_image_ui(ui: &mut Ui, update: &Update, language: Language) {
         rms = format!("{:.2}", by_depth.rms_m * 1e3)
     );
     parts::stated_ui(ui, tr!(language, "By depth [mm]"), &position(&by_depth.base_from_target))
-        .on_hover_text(what.say(language));
+        .on_hover_text(what.in_language(language));
     if let Some(seen) = &update.seen {
         let (distance_m, angle_rad) = seen.base_from_target.distance_to(&by_depth.base_from_target);
         let apart = format!("{:.2} mm, {:.2}°", distance_m * 1e3, angle_rad.to_degrees());

@@ -50,11 +50,15 @@ pub fn state_ui(ui: &mut Ui, model: &Model) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         parts::dot_ui(ui, colour);
-        ui.label(RichText::new(words.say(language)).strong().color(if tone.is_some() { colour } else { palette.text }));
+        ui.label(RichText::new(words.in_language(language)).strong().color(if tone.is_some() {
+            colour
+        } else {
+            palette.text
+        }));
     });
     let Some(newest) = model.track.newest.as_ref().filter(|_| model.track.on) else { return };
     let (rate, latency) = (format!("{:.1}", newest.rate_hz), format!("{:.0}", newest.latency_s * 1e3));
-    let words = text!("{rate} Hz · {latency} ms", rate = rate, latency = latency).say(language);
+    let words = text!("{rate} Hz · {latency} ms", rate = rate, latency = latency).in_language(language);
     let what = handeye_workbench::tr!(
         language,
         "Poses per second, and the time from the arrival of an image to the pose computed from it"

@@ -9,7 +9,7 @@ use super::*;
 use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{
-    BoardMotion, BoardPath, FollowStatus, FollowWish, LinkState, RotationFormat, Simulation, Solved, TrackState,
+    BoardMotion, BoardPath, FollowRequest, FollowStatus, LinkState, RotationFormat, Simulation, Solved, TrackState,
     Tracked,
 };
 use handeye_workbench::testing::sample;
@@ -23,7 +23,7 @@ fn driven(model: Model) -> Driven {
 /// Tracked, and not followed.
 fn tracked() -> Model {
     let mut model = sample::tracking();
-    model.track.wish = None;
+    model.track.request = None;
     model.track.follow = FollowStatus::Off;
     model
 }
@@ -137,9 +137,12 @@ fn the_error_is_told_against_the_truth_of_the_simulator_and_only_where_there_is_
 #[test]
 fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     let mut pane = driven(tracked());
-    assert_eq!(pane.click("Follow"), [Command::Track(track::Command::SetFollow(Some(FollowWish::KeepViewWithRoom)))]);
+    assert_eq!(
+        pane.click("Follow"),
+        [Command::Track(track::Command::SetFollow(Some(FollowRequest::KeepViewWithRoom)))]
+    );
     pane.click("Make room first where it is needed");
-    assert_eq!(pane.click("Follow"), [Command::Track(track::Command::SetFollow(Some(FollowWish::KeepView)))]);
+    assert_eq!(pane.click("Follow"), [Command::Track(track::Command::SetFollow(Some(FollowRequest::KeepView)))]);
     pane.click("Tip to a corner");
     pane.type_into("Corner to go to", "12");
     pane.press(egui::Key::Enter);
@@ -148,9 +151,9 @@ fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     let sent = pane.click("Follow");
     assert_eq!(
         sent,
-        [Command::Track(track::Command::SetFollow(Some(FollowWish::Corner { index: 11, stand_off_m: 0.08 })))]
+        [Command::Track(track::Command::SetFollow(Some(FollowRequest::Corner { index: 11, stand_off_m: 0.08 })))]
     );
-    pane.model().track.wish = Some(FollowWish::KeepView);
+    pane.model().track.request = Some(FollowRequest::KeepView);
     pane.steps();
     assert!(pane.sees("Starting to follow"));
     pane.model().track.follow = FollowStatus::MakingRoom;
@@ -164,7 +167,7 @@ fn the_arm_keeps_its_view_or_goes_to_a_corner_and_is_stopped() {
     pane.model().track.follow = FollowStatus::Ended(Text::verbatim("joint 3 is at its limit"));
     pane.steps();
     assert!(pane.sees("The arm does not follow the board: joint 3 is at its limit"));
-    let again = FollowWish::Corner { index: 11, stand_off_m: 0.08 };
+    let again = FollowRequest::Corner { index: 11, stand_off_m: 0.08 };
     assert_eq!(pane.click("Follow again"), [Command::Track(track::Command::SetFollow(Some(again)))]);
 }
 

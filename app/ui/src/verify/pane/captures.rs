@@ -41,7 +41,7 @@ pub fn captures_ui(
         }
         ui.end_row();
         for (id, check) in captures.iter().zip(&verification.captures) {
-            let name = text!("Capture {id}", id = id.0).say(language);
+            let name = text!("Capture {id}", id = id.0).in_language(language);
             let is_selected = model.selection.contains(id);
             if ui.selectable_label(is_selected, name).clicked() && !is_selected {
                 outbox.send(session::Command::Select(vec![*id]));

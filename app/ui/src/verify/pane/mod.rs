@@ -35,13 +35,13 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             None => parts::hint_ui(ui, tr!(language, "There is no calibration to verify yet.")),
             Some((_, None)) => parts::hint_ui(ui, without_verification(model)),
             Some((_, Some(Err(error)))) => {
-                let said = text!("Verification has no answer: {why}", why = error).say(language);
-                parts::notice_ui(ui, Tone::Bad, &said, |_| ());
+                let reported = text!("Verification has no answer: {why}", why = error).in_language(language);
+                parts::notice_ui(ui, Tone::Bad, &reported, |_| ());
             }
             Some((solved, Some(Ok(verification)))) => {
                 if !model.solve.fresh {
-                    let said = tr!(language, "Out of date: this is from earlier captures or settings");
-                    parts::notice_ui(ui, Tone::Warning, said, |_| ());
+                    let reported = tr!(language, "Out of date: this is from earlier captures or settings");
+                    parts::notice_ui(ui, Tone::Warning, reported, |_| ());
                 }
                 summary::summary_ui(ui, model, verification);
                 captures::captures_ui(ui, model, &solved.verified_captures, verification, outbox);

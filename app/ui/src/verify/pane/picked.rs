@@ -1,7 +1,7 @@
 //! A point of the image in the base, measured in two ways.
 
 use egui::Ui;
-use handeye_estimate::claim::Claim;
+use handeye_estimate::stated_uncertainty::StatedUncertainty;
 use handeye_estimate::verify::MeasuredPoint;
 use nalgebra::Vector3;
 
@@ -31,7 +31,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     };
     ui.horizontal(|ui| {
         let pixel = text!("Pixel {column}, {row}", column = picked.pixel.column, row = picked.pixel.row);
-        parts::hint_ui(ui, &pixel.say(language));
+        parts::hint_ui(ui, &pixel.in_language(language));
         if ui.add(parts::small_button(ui, tr!(language, "Clear the point"))).clicked() {
             outbox.send(live::Command::Pick(None));
         }
@@ -44,7 +44,8 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         parts::stated_ui(ui, tr!(language, "Its length [mm]"), &numbers::fixed(difference_mm.norm(), 2, 8));
     }
     let solved = model.solve.solved.as_ref();
-    let modelled = solved.is_none_or(|solved| *solved.calibration.claim() == Claim::AsModelled);
+    let modelled =
+        solved.is_none_or(|solved| *solved.calibration.stated_uncertainty() == StatedUncertainty::AsModelled);
     let meaning = if modelled {
         tr!(
             language,
@@ -62,7 +63,7 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
 fn point_ui(ui: &mut Ui, model: &Model, caption: &str, point: &Result<MeasuredPoint, Text>) {
     match point {
         Err(why) => {
-            parts::row_ui(ui, caption, |ui| parts::hint_ui(ui, &why.say(model.view.language)));
+            parts::row_ui(ui, caption, |ui| parts::hint_ui(ui, &why.in_language(model.view.language)));
         }
         Ok(point) => {
             parts::stated_ui(ui, caption, &millimetres(&(point.in_base.point().coords * 1e3)));

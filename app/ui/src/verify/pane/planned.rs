@@ -44,7 +44,7 @@ pub fn planned_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         outbox.send(taught::Command::VerifyAtPlanned);
     }
     if let Some(message) = model.messages.standing_in(Pane::Verify) {
-        parts::notice_ui(ui, Tone::Warning, &message.text.say(language), |_| ());
+        parts::notice_ui(ui, Tone::Warning, &message.text.in_language(language), |_| ());
     }
     if let Some(sequence) = model.sequence.as_ref().filter(|sequence| sequence.is_planned()) {
         went_ui(ui, model, sequence, outbox);

@@ -17,7 +17,7 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
     let language = model.view.language;
     let count = verification.captures.len();
     let title = text!("Errors of prediction over {count} {count|capture|captures}, RMS", count = count);
-    parts::section_ui(ui, &title.say(language));
+    parts::section_ui(ui, &title.in_language(language));
     let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
     parts::stated_ui(ui, tr!(language, "Middle of the board"), &mm(verification.centre_rms_m))
         .on_hover_text(tr!(language, "Distance between the measured and the predicted middle of the board"));
@@ -58,6 +58,6 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
     };
     ui.horizontal_top(|ui| {
         parts::dot_ui(ui, colour);
-        ui.add(Label::new(RichText::new(verdict.say(language)).color(palette.text)).wrap());
+        ui.add(Label::new(RichText::new(verdict.in_language(language)).color(palette.text)).wrap());
     });
 }

@@ -159,11 +159,11 @@ mod tests {
         Archive::new(sessions.clone(), outlet).import(&dataset, &Bounds::ANYWHERE);
         let Ok(Event::Session(session::Event::Failed { why })) = reported.try_recv() else { panic!("it was opened") };
         assert_eq!(
-            why.say(Language::English),
+            why.in_language(Language::English),
             "The data set was not opened: row 1 (1.png) has no image: solve this data set with “handeye calibrate” \
              instead"
         );
-        let chinese = why.say(Language::Chinese);
+        let chinese = why.in_language(Language::Chinese);
         assert!(chinese.contains("第 1 行（1.png）没有图像") && !chinese.contains("has no"), "{chinese}");
         assert!(!sessions.exists(), "nothing was begun");
     }
@@ -199,7 +199,7 @@ mod tests {
             let Ok(Event::Session(session::Event::Failed { why })) = reported.try_recv() else {
                 panic!("{image} was opened")
             };
-            let why = why.say(Language::English);
+            let why = why.in_language(Language::English);
             assert!(why.contains("outside of the folder") || why.contains("not a path relative"), "{image}: {why}");
             assert!(!why.contains("secret:") && !why.contains("root"), "{why}");
             assert!(!sessions.exists(), "nothing was begun");
@@ -211,7 +211,7 @@ mod tests {
             let Ok(Event::Session(session::Event::Failed { why })) = reported.try_recv() else {
                 panic!("{image} was opened")
             };
-            let why = why.say(Language::English);
+            let why = why.in_language(Language::English);
             assert!(why.contains("outside of the folder") || why.contains("a path relative"), "{image}: {why}");
             assert!(!sessions.exists(), "nothing was begun");
         }

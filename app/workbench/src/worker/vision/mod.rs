@@ -61,10 +61,10 @@ pub struct VisionSlots {
 struct Ended;
 
 /// The capture that is under way.
-struct UnderWay {
+struct CaptureInProgress {
     sequence: Sequence,
     /// What was reported last.
-    told: Option<CaptureWait>,
+    reported: Option<CaptureWait>,
 }
 
 /// The vision thread.
@@ -78,7 +78,7 @@ pub struct Vision {
     shutdown: CancelToken,
     search: Search,
     tracking: Option<Tracking>,
-    capture: Option<UnderWay>,
+    capture: Option<CaptureInProgress>,
 }
 
 impl Vision {
@@ -152,7 +152,7 @@ impl Vision {
                 match self.search.target {
                     Some(target) => {
                         let sequence = Sequence::new(request, target, self.outlet.now_s());
-                        self.capture = Some(UnderWay { sequence, told: None });
+                        self.capture = Some(CaptureInProgress { sequence, reported: None });
                         self.tell_progress();
                     }
                     None => self.report_refusal(request.number, refusal::no_target()),
@@ -285,8 +285,8 @@ impl Vision {
     }
 
     fn tell(&mut self, wait: CaptureWait) {
-        if let Some(capture) = self.capture.as_mut().filter(|capture| capture.told != Some(wait)) {
-            capture.told = Some(wait);
+        if let Some(capture) = self.capture.as_mut().filter(|capture| capture.reported != Some(wait)) {
+            capture.reported = Some(wait);
             let number = capture.sequence.number();
             self.outlet.report(capture::Event::Waits { number, wait });
         }

@@ -97,7 +97,7 @@ fn a_board_that_cannot_be_looked_for_is_a_state_and_not_the_end() {
     table.ask(VisionTask::Capture(request(1, 1)));
     let refused = table.feed(&board(0), 10).expect_err("nothing to measure");
     assert_eq!(refused.kind, RefusalKind::NoBoard);
-    assert!(refused.why.say(Language::English).contains("at least 3 points"), "{refused:?}");
+    assert!(refused.why.in_language(Language::English).contains("at least 3 points"), "{refused:?}");
     table.ask(VisionTask::SetTarget(BOARD));
     table.put(&board(0));
     table.turn();
@@ -119,14 +119,14 @@ fn what_a_capture_waits_for_is_told_when_it_changes() {
         .expect("the board");
     assert_eq!(again.corners, measured.corners, "the kept image gives the same corners");
     let averaging = |done| (7, CaptureWait::Images(Wait::Averaging { done, of: 3 }));
-    let told = [
+    let reported = [
         (7, CaptureWait::Images(Wait::ForImage)),
         averaging(1),
         averaging(2),
         (7, CaptureWait::Measuring),
         (7, CaptureWait::Saving),
     ];
-    assert_eq!(table.waits(), told);
+    assert_eq!(table.waits(), reported);
 }
 
 #[test]
@@ -136,12 +136,12 @@ fn an_image_without_the_board_or_with_a_blurred_one_is_refused_with_the_reason()
     let empty = RgbImage::from_pixel(320, 240, Rgb([120, 130, 140]));
     let refused = table.feed(&empty, 10).expect_err("no board");
     assert_eq!(refused.kind, RefusalKind::NoBoard);
-    assert!(refused.why.say(Language::English).contains("10×7"), "{refused:?}");
+    assert!(refused.why.in_language(Language::English).contains("10×7"), "{refused:?}");
     // A box of 13 px has σ = 3.7 px, which is 0.156 of a square.
     table.ask(VisionTask::Capture(request(2, 1)));
     let refused = table.feed(&board(6), 10).expect_err("blurred");
     assert_eq!(refused.kind, RefusalKind::Blurred);
-    assert!(refused.why.say(Language::English).contains("squares 24 px"), "{refused:?}");
+    assert!(refused.why.in_language(Language::English).contains("squares 24 px"), "{refused:?}");
     table.ask(VisionTask::Capture(request(3, 1)));
     assert!(table.feed(&board(3), 10).is_ok(), "σ = 2 px is good enough");
 }
@@ -153,7 +153,7 @@ fn a_pose_that_was_captured_before_is_named() {
     table.ask(VisionTask::Capture(CaptureRequest { others: vec![(12, near)], ..request(1, 1) }));
     let refused = table.feed(&board(0), 10).expect_err("too similar");
     assert_eq!(refused.kind, RefusalKind::TooSimilar);
-    let words = refused.why.say(Language::English);
+    let words = refused.why.in_language(Language::English);
     assert!(words.contains("Capture 12 was taken only 3.1 mm and 0.0°"), "{words}");
 }
 
@@ -215,7 +215,7 @@ fn no_images_and_a_simulation_that_rests_are_told_apart() {
         table.turn();
         let refused = table.refused().expect("it gives up");
         assert_eq!((refused.kind, refused.at_s), (kind, now_s));
-        assert!(refused.why.say(Language::English).contains(words), "{refused:?}");
+        assert!(refused.why.in_language(Language::English).contains(words), "{refused:?}");
     }
 }
 
@@ -241,7 +241,7 @@ fn images_that_never_come_to_rest_are_refused_after_the_limit() {
     }
     let refused = table.refused().expect("it gives up");
     assert_eq!(refused.kind, RefusalKind::NotSettled);
-    assert!(refused.why.say(Language::English).contains("image still changes after 1 s"), "{refused:?}");
+    assert!(refused.why.in_language(Language::English).contains("image still changes after 1 s"), "{refused:?}");
 }
 
 #[test]

@@ -136,11 +136,11 @@ impl<'a> Message<'a> {
         };
         let one = |end: usize, corner: usize| {
             let of_all = along([corner, corner]);
-            let (precision, said) = (1.0 / of_all.covariance.m11, self.precision[(end, end)]);
-            let variance = 1.0 / (precision - said);
+            let (precision, reported) = (1.0 / of_all.covariance.m11, self.precision[(end, end)]);
+            let variance = 1.0 / (precision - reported);
             let mean = variance * (precision * of_all.mean.x - self.weighted[end]);
             let off = mean - self.edge.moments.mean[end];
-            Some(off * off / (variance + 1.0 / said))
+            Some(off * off / (variance + 1.0 / reported))
         };
         match self.ends {
             [Some(a), Some(b)] => both(&along([a, b])),

@@ -10,7 +10,7 @@
 //! A gross fault is accused when it brings the board together at least three times better, and to within a twentieth
 //! of its distance. The others are fitted with noise levels of their own and judged by the F test with allowance for the
 //! number of alternatives, by a size that matters, and, where they change the model, by views held out. Errors of the robot
-//! that depend on where it stands ([`RobotField`](crate::handeye::joint::RobotField)) are part of every fit. What is accepted becomes a finding. Nothing is ever
+//! that depend on where it stands ([`PoseDependentError`](crate::handeye::joint::RobotField)) are part of every fit. What is accepted becomes a finding. Nothing is ever
 //! applied.
 //!
 //! # Needs
@@ -18,7 +18,6 @@
 //! [`Diagnosis::untested`] says so, and the findings say what is. Views out of the fit count for nothing. Of more than
 //! [`MOST_VIEWS`] views so many are examined, spread over the session.
 
-mod claim;
 mod effect;
 mod gross;
 mod judge;
@@ -27,16 +26,17 @@ mod pairing;
 mod report;
 mod screen;
 mod select;
+mod stated_uncertainty;
 pub mod views;
 mod weight;
 mod words;
 
 use serde::Serialize;
 
-use crate::claim::Claim;
 use crate::diagnose::Calibration;
 use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
 use crate::diagnose::hypotheses::NEED;
+use crate::stated_uncertainty::StatedUncertainty;
 use crate::{Fit, Observations};
 use handeye_geometry::progress::Work;
 use handeye_geometry::targets::observation;
@@ -148,32 +148,32 @@ pub(super) fn examined(
     let repaired = as_found(observations, &fit);
     let observations = repaired.as_ref().unwrap_or(observations);
     let mut diagnosis = Diagnosis::default();
-    let mut found = (&fit, Claim::AsModelled);
+    let mut found = (&fit, StatedUncertainty::AsModelled);
     if let Err(why) = examine(observations, Some(&mut found), &mut diagnosis, work) {
         diagnosis.untested = Some(why);
     }
-    let (_, claim) = found;
-    let mut claim = claim::with_open_size(claim::with_own_lens(claim, &fit), &fit);
+    let (_, stated) = found;
+    let mut stated = stated_uncertainty::with_open_size(stated_uncertainty::with_own_lens(stated, &fit), &fit);
     if diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem) {
-        claim = Claim::Nothing;
+        stated = StatedUncertainty::Nothing;
     }
-    let calibration = Calibration { fit, claim, diagnosis: Diagnosis::default() };
+    let calibration = Calibration { fit, stated, diagnosis: Diagnosis::default() };
     // After the claim: the goal is judged by it.
     let of_estimate = findings::findings(observations, Some(&calibration), options);
     Calibration { diagnosis: diagnosis.with(of_estimate), ..calibration }
 }
 
 impl Diagnosis {
-    /// With what the estimate says. It comes before what was examined, so that what the estimate has already acted upon is said as
+    /// With what the estimate says. It comes before what was examined, so that what the estimate has already acted upon is reported as
     /// the estimate says it, and said once.
     fn with(mut self, of_estimate: Vec<Finding>) -> Self {
         self.findings.splice(0..0, of_estimate);
-        let mut said: Vec<FindingCode> = Vec::new();
+        let mut reported: Vec<FindingCode> = Vec::new();
         self.findings.retain(|finding| {
             let once =
                 matches!(finding.code, FindingCode::OutlierView | FindingCode::BoardBent | FindingCode::OutlierCorners);
-            let new = !(once && said.contains(&finding.code));
-            said.push(finding.code);
+            let new = !(once && reported.contains(&finding.code));
+            reported.push(finding.code);
             new
         });
         findings::sort(&mut self.findings);
@@ -210,12 +210,12 @@ fn as_found(observations: &Observations, calibration: &Fit) -> Option<Observatio
 
 fn examine(
     observations: &Observations,
-    fit: Option<&mut (&Fit, Claim)>,
+    fit: Option<&mut (&Fit, StatedUncertainty)>,
     diagnosis: &mut Diagnosis,
     work: &Work<'_>,
 ) -> Result<(), String> {
     let cancelled = || "cancelled".to_owned();
-    let (calibration, claim) = fit.map(|(fit, claim)| (*fit, claim)).unzip();
+    let (calibration, stated) = fit.map(|(fit, stated)| (*fit, stated)).unzip();
     let lens = calibration.and_then(|calibration| calibration.lens_by_corners);
     let sight = views::SessionViews::new(observations, lens).map_err(|why| why.to_string())?;
     diagnosis.findings.extend(words::not_finite(&sight));
@@ -253,12 +253,12 @@ fn examine(
     let mut fine = words::fine(&selection);
     if let Some(calibration) = calibration {
         for h in &mut fine {
-            h.applied = claim::is_applied(calibration, h);
+            h.applied = stated_uncertainty::is_applied(calibration, h);
         }
     }
     let noise = calibration.and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
-    if let Some((calibration, claim)) = calibration.zip(claim) {
-        *claim = claim::claim(&selection, calibration);
+    if let Some((calibration, stated)) = calibration.zip(stated) {
+        *stated = stated_uncertainty::stated_uncertainty(&selection, calibration);
     }
     diagnosis.findings.extend(fine.iter().filter(|h| h.accepted).map(words::finding_of));
     let beside = fine.iter().any(|h| h.accepted && !h.applied);

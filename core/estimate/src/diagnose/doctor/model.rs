@@ -8,7 +8,7 @@
 //! with `x`, `y` the corrections of hand-eye and target, `f` those of lens and warp (with the information that the
 //! corners hold on them apart from the poses), `Σ_i` the covariance of the seen pose by corner noise, `Q_i = D_i D_iᵀ`
 //! the robot's noise brought into the target's frame, and `h_i` the column of a hypothesis. The noise levels are found
-//! by Fisher scoring on the restricted likelihood, under every hypothesis anew. A hypothesis with `q` numbers is judged
+//! by Fisher scoring on the restricted likelihood, under every hypothesis again. A hypothesis with `q` numbers is judged
 //! by Wald's statistic `W = θᵀ Cov(θ)⁻¹ θ` against the F distribution.
 //!
 //! Reference: Patterson & Thompson 1971 (restricted likelihood); Cook & Weisberg 1982 (deletion of cases).
@@ -23,7 +23,7 @@ use super::effect::Effect;
 use super::views::SessionViews;
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::field::{self, HALF, Places, SLOPES};
+use crate::handeye::joint::pose_dependent_error::{self, HALF, Places, SLOPES};
 use crate::resolution;
 use handeye_geometry::se3;
 use handeye_geometry::statistics::pooled_freedom;
@@ -219,7 +219,7 @@ impl<'a> Model<'a> {
                 turned.fixed_view_mut::<3, 3>(part, part).copy_from(tip_from_base.matrix());
             }
             for by_error in [row.by_robot, row.by_robot * turned].iter().take(if self.in_base { 2 } else { 1 }) {
-                let columns = field::columns(&place, by_error);
+                let columns = pose_dependent_error::columns(&place, by_error);
                 design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
                 at += columns.ncols();
             }

@@ -37,9 +37,9 @@ pub fn text(diagnosis: &Diagnosis, detail: Detail) -> String {
     if let Some(why) = &diagnosis.untested {
         line!(out, "hypotheses were not tested: {why}");
     }
-    let said = |code: FindingCode| diagnosis.findings.iter().any(|finding| finding.code == code);
+    let reported = |code: FindingCode| diagnosis.findings.iter().any(|finding| finding.code == code);
     let (minor, fine): (Vec<&Hypothesis>, Vec<&Hypothesis>) =
-        diagnosis.hypotheses.iter().filter(|h| !h.accepted && !said(h.code)).partition(|h| h.significant);
+        diagnosis.hypotheses.iter().filter(|h| !h.accepted && !reported(h.code)).partition(|h| h.significant);
     for (what, hypotheses) in
         [("seen, but too small to matter or explained by what was found", minor), ("checked and found fine", fine)]
     {
@@ -76,7 +76,7 @@ fn hypothesis(out: &mut String, number: usize, h: &Hypothesis) {
         (false, true, false) => "significant, but too small or explained by another",
         (false, false, _) => "not supported",
     };
-    line!(out, "  {number}. [{}] {verdict}: {}", code(h.code), h.text.say(English));
+    line!(out, "  {number}. [{}] {verdict}: {}", code(h.code), h.text.in_language(English));
 }
 
 /// What a hypothesis is about, for a list of what was looked at.

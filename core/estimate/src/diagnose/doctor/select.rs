@@ -1,5 +1,5 @@
 //! Which hypotheses the data support: each is fitted with noise levels of its own, the best is taken in, and the rest are
-//! judged anew beside it.
+//! judged again beside it.
 
 use super::effect::Effect;
 use super::judge::{Judged, LEAST_SCALE, confirm, judge};
@@ -9,7 +9,7 @@ use super::views::SessionViews;
 use super::weight::Weight;
 use crate::TargetSize;
 use crate::diagnose::hypotheses::agreement::Agreement;
-use crate::handeye::joint::field::Places;
+use crate::handeye::joint::pose_dependent_error::Places;
 use handeye_geometry::progress::Work;
 
 /// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
@@ -24,7 +24,7 @@ const ROUNDS: usize = 3;
 /// Hypotheses taken in at the most, which bounds the work: one for every view that is an outlier by itself, and some more.
 const MOST_TAKEN: usize = 12;
 /// Work after which no more is taken in, as [`Model::work`] counts it; a round of hypotheses beside each other may go a little
-/// beyond it, and that more is wrong is said. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
+/// beyond it, and that more is wrong is reported. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
 const MOST_WORK: u64 = 100_000_000;
 /// Views that are tested together at the most.
 const MOST_TOGETHER: usize = 40;

@@ -281,7 +281,7 @@ impl Fit {
     }
 }
 
-/// Poses anew where a detector states what the corners of a view have in common, as those of hard edges do: of a board along the
+/// Poses again where a detector states what the corners of a view have in common, as those of hard edges do: of a board along the
 /// pixels the residuals do not show how far all of it may be off.
 fn with_what_corners_share(fits: &mut [Option<Fit>], camera: &Intrinsics, points: &BoardPoints) {
     let stated = fits.iter().flatten().filter(|fit| fit.corners.covariance().is_some());

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
-use crate::claim::Claim;
 use crate::diagnose::Calibration;
+use crate::stated_uncertainty::StatedUncertainty;
 use crate::{JointFit, ViewResult, ViewStatus, resolution};
 use handeye_geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median};
 use handeye_wording::text;
@@ -266,8 +266,8 @@ fn robot_noise(calibration: &Calibration) -> Option<Finding> {
     let text = text!(
         "The robot limits the answer: its noise of {position} and {orientation} per axis moves corners by {robot} px, their \
          own noise is {corner} px. Better images will not help much; settling longer before each will.",
-        position = resolution::place_said(noise.robot_m),
-        orientation = resolution::angle_said(noise.robot_rad),
+        position = resolution::place_text(noise.robot_m),
+        orientation = resolution::angle_text(noise.robot_rad),
         robot = shown(robot_px, 2),
         corner = shown(corner_px, 2)
     );
@@ -339,7 +339,7 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
         );
         finding(FindingCode::GoalNotReached, Severity::Advice, text)
     };
-    if calibration.claim != Claim::AsModelled {
+    if calibration.stated != StatedUncertainty::AsModelled {
         return Some(not_reached(text!("More views do not help until what was found is corrected.")));
     }
     let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {

@@ -115,8 +115,8 @@ mod tests {
     #[test]
     fn an_error_beyond_chance_and_beyond_that_of_the_calibration_is_said_with_its_size() {
         let found = finding(&report(1.0, Some(errors(2.0, 0.003))), Some(5e-4)).expect("off");
-        let said = found.to_string();
-        assert!(said.contains("+2.00 ± 0.10 mm at a distance of 500 mm, growing by +0.30 ± 0.01 %"), "{said}");
+        let reported = found.to_string();
+        assert!(reported.contains("+2.00 ± 0.10 mm at a distance of 500 mm, growing by +0.30 ± 0.01 %"), "{reported}");
         assert_eq!((found.severity, found.value("depth_offset")), (Severity::Advice, Some(2.0)));
         assert_eq!(finding(&report(1.0, Some(errors(2.0, 0.0))), Some(3e-3)), None, "less than the calibration is off");
         assert_eq!(finding(&report(1.0, Some(errors(0.2, 0.0))), None), None, "two standard deviations");
@@ -128,8 +128,8 @@ mod tests {
 
     #[test]
     fn a_unit_is_named() {
-        let said = |ratio| finding(&report(ratio, None), None).expect("gross").to_string();
-        assert!(said(1002.0).contains("they are in mm"), "{}", said(1002.0));
-        assert!(said(0.7).contains("of another camera"), "{}", said(0.7));
+        let reported = |ratio| finding(&report(ratio, None), None).expect("gross").to_string();
+        assert!(reported(1002.0).contains("they are in mm"), "{}", reported(1002.0));
+        assert!(reported(0.7).contains("of another camera"), "{}", reported(0.7));
     }
 }

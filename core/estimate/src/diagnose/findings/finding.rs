@@ -134,7 +134,7 @@ pub struct Finding {
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text.say(English))
+        f.write_str(&self.text.in_language(English))
     }
 }
 

@@ -174,12 +174,12 @@ fn unclear(calibration: &Calibration) -> Option<Finding> {
     if unclear < UNCLEAR || is_fine {
         return None;
     }
-    let level = |low: f64, high: f64, least: f64, said: &dyn Fn(f64) -> String| {
+    let level = |low: f64, high: f64, least: f64, reported: &dyn Fn(f64) -> String| {
         // Below what a robot resolves there is nothing to tell from nothing.
         if low < least {
-            text!("below {high}", high = said(high))
+            text!("below {high}", high = reported(high))
         } else {
-            text!("between {low} and {high}", low = said(low), high = said(high))
+            text!("between {low} and {high}", low = reported(low), high = reported(high))
         }
     };
     let text = text!(

@@ -84,7 +84,7 @@ fn the_rise_along_a_direction_is_that_of_the_optimum_there() {
         }
         let at_end = System::new(&problem, &held, &cancel).expect("solves").cost(&NOISE) - system.cost(&NOISE);
         println!("{times}: {rise:.5}, by many steps {at_end:.5}, of a parabola {:.5}", times * times);
-        // A step of a hundredth that is not taken anew leaves a part in ten thousand of a unit, and its cube.
+        // A step of a hundredth that is not taken again leaves a part in ten thousand of a unit, and its cube.
         assert!((rise / at_end - 1.0).abs() < 1e-3, "{rise} {at_end}");
         assert!((at_end / (times * times) - 1.0).abs() > 0.01, "{at_end}: a parabola would do");
     }

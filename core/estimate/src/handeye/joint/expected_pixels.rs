@@ -8,9 +8,9 @@
 use nalgebra::{DMatrix, Isometry3, Matrix2xX, Matrix6, Matrix6xX, Point3, SMatrix, Vector2};
 
 use super::chain::Chain;
-use super::field;
+use super::pose_dependent_error;
 use super::view_block::{Layout, prior_weight};
-use super::{Noise, RobotField};
+use super::{Noise, PoseDependentError};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::se3::skew;
@@ -35,7 +35,7 @@ impl<'a> ExpectedPixels<'a> {
         intrinsics: &'a Intrinsics,
         chain: &Chain,
         (layout, lens): (Layout, usize),
-        at: Option<(&RobotField, &Pose<Base, Tip>)>,
+        at: Option<(&PoseDependentError, &Pose<Base, Tip>)>,
         noise: &Noise,
         covariance: &'a DMatrix<f64>,
     ) -> Self {
@@ -44,7 +44,7 @@ impl<'a> ExpectedPixels<'a> {
         by_shared.fixed_columns_mut::<6>(6).copy_from(&Matrix6::identity());
         by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&chain.by_joints.columns(0, layout.joints));
         if let Some((field, base_from_tip)) = at {
-            let slopes = field::columns(&field.place(base_from_tip), &chain.by_correction);
+            let slopes = pose_dependent_error::columns(&field.place(base_from_tip), &chain.by_correction);
             by_shared.columns_mut(layout.field_at(), layout.field).copy_from(&slopes);
         }
         let spread = Matrix6::from_diagonal(&prior_weight(noise).map(f64::recip));

@@ -11,7 +11,7 @@ use nalgebra::{Cholesky, DMatrix, Matrix6, Vector2, Vector6};
 
 use super::chain::Chain;
 use super::expected_pixels::ExpectedPixels;
-use super::field::{HALF, RobotField, SLOPES};
+use super::pose_dependent_error::{HALF, PoseDependentError, SLOPES};
 use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
 use super::{Free, Noise};
 use crate::Fit;
@@ -37,7 +37,7 @@ pub struct ViewModel {
     noise: Noise,
     board: BoardPoints,
     shape: BoardShape,
-    field: Option<RobotField>,
+    field: Option<PoseDependentError>,
     layout: Layout,
 }
 

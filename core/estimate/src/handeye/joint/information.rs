@@ -14,8 +14,8 @@
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::Noise;
-use super::field::HALF;
 use super::normal::System;
+use super::pose_dependent_error::HALF;
 use super::variance::{Levels, Likelihood};
 use super::view_block::{Layout, PixelWeights, prior_weight};
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
-use super::field::HALF;
+use super::pose_dependent_error::HALF;
 use super::view_block::{Layout, Own, PixelWeights, Rest, ViewBlock, add_rest, add_square, columns, prior_weight};
 use super::{DepthWeight, JOINT_PRIOR_RAD, JointProblem, Noise};
 use crate::handeye::HandEyeError;

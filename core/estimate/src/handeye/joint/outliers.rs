@@ -11,8 +11,8 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector6};
 
-use super::field;
 use super::normal::System;
+use super::pose_dependent_error;
 use super::view_block::{Layout, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, Noise, fit};
 use crate::handeye::HandEyeError;
@@ -161,8 +161,8 @@ fn distances(
         by_shared.columns_mut(Layout::FORM_AT, layout.form).copy_from(&factor.solve(&equations.pose_by_form));
         by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&chain.by_joints.columns(0, layout.joints));
         if let Some(field) = &state.field {
-            let columns = field::columns(&field.place(&view.base_from_tip), &chain.by_correction);
-            by_shared.columns_mut(layout.field_at(), field::SLOPES).copy_from(&columns);
+            let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
+            by_shared.columns_mut(layout.field_at(), pose_dependent_error::SLOPES).copy_from(&columns);
         }
         let shared = &by_shared * &covariance * by_shared.transpose();
         let shared = Matrix6::from_fn(|r, c| shared[(r, c)]);
@@ -190,12 +190,12 @@ fn distances(
 /// The slopes of the robot's field, position and orientation: where they are among the shared unknowns, their variance, and on
 /// how many of them, which the data determine, that rests.
 fn slopes(system: &System, noise: &Noise, covariance: &DMatrix<f64>) -> Vec<(Range<usize>, f64, f64)> {
-    let halves = [(0, noise.field_m), (field::HALF, noise.field_rad)];
+    let halves = [(0, noise.field_m), (pose_dependent_error::HALF, noise.field_rad)];
     let halves = halves.into_iter().filter(|(at, _)| *at < system.slopes.len()).map(|(at, sigma)| {
         let first = system.layout.field_at() + at;
-        let part = first..first + field::HALF;
+        let part = first..first + pose_dependent_error::HALF;
         let unknown: f64 = part.clone().map(|i| covariance[(i, i)]).sum::<f64>() / sigma.powi(2);
-        (part, sigma.powi(2), field::HALF as f64 - unknown)
+        (part, sigma.powi(2), pose_dependent_error::HALF as f64 - unknown)
     });
     halves.collect()
 }

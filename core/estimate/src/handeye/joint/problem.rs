@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::handeye::Mode;
 use crate::handeye::joint::chain::MAX_JOINTS;
-use crate::handeye::joint::field::{Places, RobotField};
+use crate::handeye::joint::pose_dependent_error::{Places, PoseDependentError};
 use crate::handeye::joint::state::State;
 use crate::handeye::joint::weights::CornerWeights;
 use handeye_geometry::camera::Intrinsics;
@@ -27,7 +27,7 @@ pub struct Free {
     /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
     /// [`JOINT_PRIOR_RAD`](super::JOINT_PRIOR_RAD). Those of the first and the last joint stay zero: the two links take them up.
     pub joints: bool,
-    /// Errors of the robot that depend on where it stands, see [`RobotField`].
+    /// Errors of the robot that depend on where it stands, see [`PoseDependentError`].
     pub field: bool,
     /// Errors of the depths of the views, see [`DepthBias`](handeye_geometry::view_equations::DepthBias).
     pub depth: bool,
@@ -139,9 +139,9 @@ impl<'a> JointProblem<'a> {
     }
 
     /// The field without errors, where it is free and the tip does not stay where it is.
-    pub(super) fn field(&self) -> Option<RobotField> {
+    pub(super) fn field(&self) -> Option<PoseDependentError> {
         let poses = self.views.iter().map(|view| &view.base_from_tip);
-        self.free.field.then(|| Places::of(poses).map(RobotField::none)).flatten()
+        self.free.field.then(|| Places::of(poses).map(PoseDependentError::none)).flatten()
     }
 }
 

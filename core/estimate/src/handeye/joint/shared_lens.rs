@@ -175,7 +175,7 @@ pub fn by_others<S>(sessions: &[Fitted<S>], one: usize) -> Option<LensEstimate> 
 
 /// Rounds from fits of two or more sessions, each by itself, until the lens that they state together stands still; it is
 /// returned with the last fits. `None` when the lens is undetermined or does not settle. `refit` makes a new fit of a session in a round (from 0) from its
-/// last one, with what the others say of the lens; it may decide anew what belongs to the model in the first `deciding`
+/// last one, with what the others say of the lens; it may decide again what belongs to the model in the first `deciding`
 /// rounds.
 ///
 /// # Errors

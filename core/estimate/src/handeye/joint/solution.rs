@@ -6,12 +6,12 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector6};
 
 use crate::handeye::joint::JointProblem;
-use crate::handeye::joint::field::{RobotField, corrected_base_from_tip};
 use crate::handeye::joint::integrated::SmallSample;
 use crate::handeye::joint::normal::System;
+use crate::handeye::joint::pose_dependent_error::{PoseDependentError, corrected_base_from_tip};
 use crate::handeye::joint::problem::{Free, JointStart, Noise};
 use crate::handeye::{HandEye, HandEyeError};
-use crate::uncertainty::widening::{self, Widening};
+use crate::uncertainty::overdispersion::{self, Overdispersion};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::bent::BoardShape;
@@ -46,7 +46,7 @@ pub struct JointSolution {
     /// Offsets of the joints, radians, to be added to the reported angles; empty when they were not estimated.
     pub joint_offsets_rad: Vec<f64>,
     /// Errors of the robot that depend on where it stands; `None` when they were not estimated.
-    pub field: Option<RobotField>,
+    pub field: Option<PoseDependentError>,
     /// Minus twice the log of the restricted likelihood of the noise levels; `None` when these were given.
     pub deviance: Option<f64>,
     /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, errors of
@@ -128,9 +128,9 @@ impl JointSolution {
     }
 
     /// Multiplies the covariance, and that of a free lens with what rests on it, because the data show that they are too small.
-    pub fn widen(&mut self, widening: &Widening) {
+    pub fn widen(&mut self, widening: &Overdispersion) {
         if widening.lens > 1.0 {
-            self.covariance = widening::of_lens(&self.covariance, self.lens_places(), widening.lens);
+            self.covariance = overdispersion::of_lens(&self.covariance, self.lens_places(), widening.lens);
         }
         self.covariance *= widening.factor;
     }

@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Point3, Vector6};
 
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::field::{RobotField, SLOPES};
+use crate::handeye::joint::pose_dependent_error::{PoseDependentError, SLOPES};
 use crate::handeye::joint::view_block::Layout;
 use crate::handeye::joint::{JointProblem, JointSolution, JointStart};
 use handeye_geometry::camera::Intrinsics;
@@ -25,7 +25,7 @@ pub struct State {
     /// Empty when the joints are not free.
     pub joints_rad: Vec<f64>,
     /// `None` when it is not free.
-    pub field: Option<RobotField>,
+    pub field: Option<PoseDependentError>,
     /// Of every view, beyond that of the field.
     pub corrections: Vec<Vector6<f64>>,
 }
@@ -112,7 +112,7 @@ impl State {
         for (j, offset) in next.joints_rad.iter_mut().enumerate() {
             *offset += shared[layout.joints_at() + j];
         }
-        for (k, slope) in next.field.iter_mut().flat_map(RobotField::slopes_mut).enumerate() {
+        for (k, slope) in next.field.iter_mut().flat_map(PoseDependentError::slopes_mut).enumerate() {
             *slope += shared[layout.field_at() + k];
         }
         for (correction, step) in next.corrections.iter_mut().zip(own) {

@@ -8,9 +8,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use super::field::HALF;
 use super::information::information;
 use super::normal::{Reduced, System};
+use super::pose_dependent_error::HALF;
 use super::view_block::{add_square, columns, prior_weight};
 use super::{JointProblem, Noise};
 use crate::handeye::joint::state::State;

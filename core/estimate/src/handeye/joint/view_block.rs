@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix6, Matrix6xX, MatrixXx6,
 
 use super::Noise;
 use super::chain::Chain;
-use super::field::{self, SLOPES};
+use super::pose_dependent_error::{self, SLOPES};
 use handeye_geometry::view_equations::PoseEquations;
 
 /// Where which shared unknown is.
@@ -152,7 +152,9 @@ impl ViewBlock {
         let by_joints = chain.by_joints.columns(0, layout.joints);
         by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&(by_pose * by_joints));
         if let Some(place) = place {
-            by_shared.columns_mut(layout.field_at(), SLOPES).copy_from(&field::columns(place, &by_correction));
+            by_shared
+                .columns_mut(layout.field_at(), SLOPES)
+                .copy_from(&pose_dependent_error::columns(place, &by_correction));
         }
         let by_shared = by_shared.transpose();
         let own = by_correction.tr_mul(&by_correction);

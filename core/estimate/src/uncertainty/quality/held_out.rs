@@ -46,7 +46,7 @@ pub fn board_error_m(
 
 /// [`HeldOut`] over five folds (or one view at a time when there are fewer than ten). View `i` is in fold `i mod folds`. The
 /// answer without a fold is one Newton step from that of all views, whose equations are at hand, so that no view is
-/// linearised anew: what the step leaves is of second order in its length. Noise levels are kept: without a fifth of the
+/// linearised again: what the step leaves is of second order in its length. Noise levels are kept: without a fifth of the
 /// views they differ by a few percent, which moves a prediction by much less than its error.
 ///
 /// `None` when a fold leaves too few views for a fit, or puts a held-out target behind the camera. `work` is a

@@ -121,11 +121,11 @@ impl Bag {
 
     /// Whether nothing moves from one time to another, as far as anything says so.
     pub fn is_still(&self, from: i64, to: i64) -> bool {
-        let mut said = false;
+        let mut reported = false;
         for moving in self.frames.moving().chain(self.poses.values()) {
             let within = between(moving, from, to);
             let Some((_, first)) = within.first() else { continue };
-            said |= within.len() > 1;
+            reported |= within.len() > 1;
             let is_near = |pose: &Isometry3<f64>| {
                 (pose.translation.vector - first.translation.vector).norm() < STILL_M
                     && pose.rotation.angle_to(&first.rotation) < STILL_RAD
@@ -137,13 +137,13 @@ impl Bag {
         for values in self.joints.values() {
             let within = between(values, from, to);
             let Some((_, first)) = within.first() else { continue };
-            said |= within.len() > 1;
+            reported |= within.len() > 1;
             let is_near = |other: &Vec<f64>| other.iter().zip(first).all(|(a, b)| (a - b).abs() < STILL_RAD);
             if !within.iter().all(|(_, other)| is_near(other)) {
                 return false;
             }
         }
-        said
+        reported
     }
 }
 

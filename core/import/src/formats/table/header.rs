@@ -117,7 +117,7 @@ pub(super) fn with_header(file: &str, lines: &[Line]) -> Option<Vec<Track>> {
         let unit = LengthUnit::ALL.into_iter().find(|u| u.name() == unit);
         stated.length = unit.map(|unit| Known::by(by_header(&lines[at].cells[translation[0]]), unit));
     }
-    let beside = beside(&header);
+    let extra_columns = extra_columns(&header);
     let mut samples = Vec::new();
     for line in &lines[at + 1..] {
         let cell = |i: usize| line.cells.get(i).map_or("", String::as_str);
@@ -137,8 +137,8 @@ pub(super) fn with_header(file: &str, lines: &[Line]) -> Option<Vec<Track>> {
             _ => None,
         };
         let Some(pose) = pose else { continue };
-        let (named, counted) = called(line, &beside);
-        let joints: Option<Vec<f64>> = beside.joints.iter().map(|i| number(cell(*i))).collect();
+        let (named, counted) = called(line, &extra_columns);
+        let joints: Option<Vec<f64>> = extra_columns.joints.iter().map(|i| number(cell(*i))).collect();
         samples.push(sample(file, line, named, counted, pose, joints.unwrap_or_default()));
     }
     let mut track = tree::track(file.to_owned(), file, stated, samples)?;
@@ -147,13 +147,13 @@ pub(super) fn with_header(file: &str, lines: &[Line]) -> Option<Vec<Track>> {
 }
 
 /// Columns that stand with those of a pose.
-struct Beside {
+struct ExtraColumns {
     image: Option<usize>,
     index: Option<usize>,
     joints: Vec<usize>,
 }
 
-fn beside(header: &[(String, Option<&str>)]) -> Beside {
+fn extra_columns(header: &[(String, Option<&str>)]) -> ExtraColumns {
     let find = |name: &str| header.iter().position(|(column, _)| column == name);
     let image = header.iter().position(|(name, _)| {
         matches!(
@@ -196,17 +196,18 @@ fn beside(header: &[(String, Option<&str>)]) -> Beside {
                 .find_map(|prefix| find(&format!("{prefix}{j}")))
         })
         .collect();
-    Beside { image, index, joints }
+    ExtraColumns { image, index, joints }
 }
 
 /// The image and the number of a row.
-fn called(line: &Line, beside: &Beside) -> (Option<String>, Option<u64>) {
+fn called(line: &Line, extra_columns: &ExtraColumns) -> (Option<String>, Option<u64>) {
     let cell = |i: usize| line.cells.get(i).map_or("", String::as_str);
-    let named = beside.image.map(|i| cell(i).to_owned()).filter(|name| !name.is_empty()).or_else(|| image_of(line));
+    let named =
+        extra_columns.image.map(|i| cell(i).to_owned()).filter(|name| !name.is_empty()).or_else(|| image_of(line));
     match named {
         // An image that is called by its number.
         Some(name) if name.bytes().all(|b| b.is_ascii_digit()) => (None, name.parse().ok()),
-        named => (named, beside.index.and_then(|i| number(cell(i))).and_then(whole)),
+        named => (named, extra_columns.index.and_then(|i| number(cell(i))).and_then(whole)),
     }
 }
 
@@ -214,16 +215,18 @@ fn called(line: &Line, beside: &Beside) -> (Option<String>, Option<u64>) {
 pub(super) fn joints(file: &str, lines: &[Line]) -> Option<JointSeries> {
     let columns =
         |line: &Line| -> Vec<(String, Option<&'static str>)> { line.cells.iter().map(|cell| column(cell)).collect() };
-    let is_header = |line: &Line| !line.is_numeric() && beside(&columns(line)).joints.len() >= LEAST_JOINTS;
+    let is_header = |line: &Line| !line.is_numeric() && extra_columns(&columns(line)).joints.len() >= LEAST_JOINTS;
     let at = lines.iter().take(20).position(is_header)?;
     let header = columns(&lines[at]);
-    let beside = beside(&header);
+    let extra_columns = extra_columns(&header);
+    let unit = header[extra_columns.joints[0]]
+        .1
+        .and_then(|unit| AngleUnit::ALL.into_iter().find(|known| known.name() == unit));
     let unit =
-        header[beside.joints[0]].1.and_then(|unit| AngleUnit::ALL.into_iter().find(|known| known.name() == unit));
-    let unit = unit.map(|unit| Known::by(format!("the header of {file}: {}", lines[at].cells[beside.joints[0]]), unit));
+        unit.map(|unit| Known::by(format!("the header of {file}: {}", lines[at].cells[extra_columns.joints[0]]), unit));
     let samples = lines[at + 1..].iter().filter_map(|line| {
-        let values = beside.joints.iter().map(|i| number(line.cells.get(*i)?)).collect::<Option<Vec<f64>>>()?;
-        let (image, number) = called(line, &beside);
+        let values = extra_columns.joints.iter().map(|i| number(line.cells.get(*i)?)).collect::<Option<Vec<f64>>>()?;
+        let (image, number) = called(line, &extra_columns);
         Some(joints::sample(super::place(file, line), image, number, values))
     });
     joints::series(file.to_owned(), Vec::new(), unit, samples.collect())

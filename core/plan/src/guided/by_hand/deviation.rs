@@ -154,28 +154,31 @@ mod tests {
     fn advice(present: &Pose<Camera, Target>, wanted: &Pose<Camera, Target>) -> Option<String> {
         let deviation = Deviation::between(&camera(), &BOARD, present, wanted).expect("in front of the camera");
         assert_eq!(deviation.is_near(), deviation.advice().is_none());
-        deviation.advice().map(|text| text.say(English))
+        deviation.advice().map(|text| text.in_language(English))
     }
 
     #[test]
     fn words_say_what_a_person_sees_when_it_is_done() {
         let straight = view(Vector3::zeros());
-        let said = |wanted: &Pose<Camera, Target>| advice(&straight, wanted).expect("far from it");
+        let reported = |wanted: &Pose<Camera, Target>| advice(&straight, wanted).expect("far from it");
         // Turned about the axis to the right, what is below goes away from the camera: y is down, z away.
         let lower_away = view(Vector3::new(0.5, 0.0, 0.0));
         let corner = |row: usize| lower_away.isometry() * BOARD.point(row * BOARD.grid().columns);
         assert!(corner(BOARD.grid().rows - 1).z > corner(0).z);
-        assert_eq!(said(&lower_away), "Tilt by 29°: the lower side of the board away");
-        assert_eq!(said(&view(Vector3::new(-0.5, 0.0, 0.0))), "Tilt by 29°: the upper side of the board away");
-        assert_eq!(said(&view(Vector3::new(0.0, 0.5, 0.0))), "Tilt by 29°: the left side of the board away");
-        assert_eq!(said(&view(Vector3::new(0.0, -0.5, 0.0))), "Tilt by 29°: the right side of the board away");
-        assert_eq!(said(&view(Vector3::new(0.0, 0.0, 0.5))), "Turn the board in the image clockwise by 29°");
-        assert_eq!(said(&view(Vector3::new(0.0, 0.0, -0.5))), "Turn the board in the image counterclockwise by 29°");
+        assert_eq!(reported(&lower_away), "Tilt by 29°: the lower side of the board away");
+        assert_eq!(reported(&view(Vector3::new(-0.5, 0.0, 0.0))), "Tilt by 29°: the upper side of the board away");
+        assert_eq!(reported(&view(Vector3::new(0.0, 0.5, 0.0))), "Tilt by 29°: the left side of the board away");
+        assert_eq!(reported(&view(Vector3::new(0.0, -0.5, 0.0))), "Tilt by 29°: the right side of the board away");
+        assert_eq!(reported(&view(Vector3::new(0.0, 0.0, 0.5))), "Turn the board in the image clockwise by 29°");
+        assert_eq!(
+            reported(&view(Vector3::new(0.0, 0.0, -0.5))),
+            "Turn the board in the image counterclockwise by 29°"
+        );
         let place = |x: f64, y: f64, z: f64| at(Vector3::new(x, y, z), Vector3::zeros());
-        assert_eq!(said(&place(0.1, 0.02, 0.4)), "Bring the board to the right in the image");
-        assert_eq!(said(&place(0.0, -0.1, 0.4)), "Bring the board up in the image");
-        assert_eq!(said(&place(0.0, 0.0, 0.25)), "Camera and board closer together: 25 cm");
-        assert_eq!(said(&place(0.0, 0.0, 0.6)), "Camera and board farther apart: 60 cm");
+        assert_eq!(reported(&place(0.1, 0.02, 0.4)), "Bring the board to the right in the image");
+        assert_eq!(reported(&place(0.0, -0.1, 0.4)), "Bring the board up in the image");
+        assert_eq!(reported(&place(0.0, 0.0, 0.25)), "Camera and board closer together: 25 cm");
+        assert_eq!(reported(&place(0.0, 0.0, 0.6)), "Camera and board farther apart: 60 cm");
         assert_eq!(advice(&straight, &view(Vector3::new(0.05, 0.05, -0.1))), None);
     }
 

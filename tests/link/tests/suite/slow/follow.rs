@@ -5,7 +5,7 @@ use std::sync::mpsc::channel;
 use handeye_arm::JointValues;
 use handeye_cell::scene::Scene;
 use handeye_coppeliasim::cell::{
-    Arm, ArmKinematics, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowWish, MotionTolerance,
+    Arm, ArmKinematics, CellPaths, FollowEnd, FollowGoal, FollowLimits, FollowMoment, FollowRequest, MotionTolerance,
     Workspace,
 };
 use handeye_coppeliasim::{
@@ -52,8 +52,8 @@ impl Bench {
         sim.get_object_pose(dummy, ObjectHandle::WORLD).expect("a call")
     }
 
-    fn follow(&mut self, wish: &mut dyn FnMut(&FollowMoment) -> FollowWish) -> Result<FollowEnd, LinkError> {
-        self.arm.follow(&self.kinematics, &FollowLimits::default(), wish)
+    fn follow(&mut self, request: &mut dyn FnMut(&FollowMoment) -> FollowRequest) -> Result<FollowEnd, LinkError> {
+        self.arm.follow(&self.kinematics, &FollowLimits::default(), request)
     }
 }
 
@@ -139,7 +139,7 @@ fn the_tip_moves_along_with_a_goal_on_a_circle() {
         if after_s > 1.0 {
             lags_mm.push(lag_m * 1e3);
         }
-        if after_s > 11.0 { FollowWish::End } else { FollowWish::Towards(circle(moment.sim_time_s)) }
+        if after_s > 11.0 { FollowRequest::End } else { FollowRequest::Towards(circle(moment.sim_time_s)) }
     });
     assert_eq!(end, Ok(FollowEnd::Released));
     // Samples of the last second are those in which it had been let go.
@@ -187,21 +187,21 @@ fn whenever_the_goal_is_taken_away_or_stop_is_pressed_the_arm_comes_to_rest_with
                 goal.base_from_tip = shifted(&goal.base_from_tip, jump);
             }
             if pass <= until {
-                return FollowWish::Towards(goal);
+                return FollowRequest::Towards(goal);
             }
             since_taken += 1;
             match taken {
                 // It rests for some passes, moves again, rests for good.
                 Taken::Rest if since_taken <= again || (2 * again..2 * again + 15).contains(&since_taken) => {
-                    FollowWish::Rest
+                    FollowRequest::Rest
                 }
-                Taken::Rest if since_taken < 2 * again => FollowWish::Towards(goal),
-                Taken::Rest | Taken::End => FollowWish::End,
+                Taken::Rest if since_taken < 2 * again => FollowRequest::Towards(goal),
+                Taken::Rest | Taken::End => FollowRequest::End,
                 Taken::Stop => {
                     if since_taken == 1 {
                         other.stop().expect("a call");
                     }
-                    FollowWish::Towards(goal)
+                    FollowRequest::Towards(goal)
                 }
             }
         });
@@ -234,7 +234,7 @@ fn the_target_dummy_shows_the_goal_and_a_motion_to_a_pose_works_afterwards() {
         if passes == 2 {
             shown = Some(other.sim().get_object_pose(dummy, ObjectHandle::WORLD).expect("a call"));
         }
-        if passes < 60 { FollowWish::Towards(still(goal)) } else { FollowWish::End }
+        if passes < 60 { FollowRequest::Towards(still(goal)) } else { FollowRequest::End }
     });
     assert_eq!(end, Ok(FollowEnd::Released));
     let (distance_m, angle_rad) = shown.expect("two passes").distance_to(&goal);
@@ -259,7 +259,7 @@ fn a_goal_that_leaves_the_workspace_leaves_the_arm_standing_inside() {
     let end = bench.arm.follow(&bench.kinematics, &limits, &mut |moment| {
         let after_s = moment.sim_time_s - *begin_s.get_or_insert(moment.sim_time_s);
         let goal = shifted(&start, velocity_m_s * after_s);
-        FollowWish::Towards(FollowGoal { velocity_m_s, ..still(goal) })
+        FollowRequest::Towards(FollowGoal { velocity_m_s, ..still(goal) })
     });
     assert_eq!(end, Ok(FollowEnd::Workspace));
     let inside_m = (at.z + reach.z) - bench.tip().translation().z;
@@ -278,7 +278,7 @@ fn following_gives_way_when_somebody_else_moves_a_joint() {
         if passes == 5 {
             other.sim().set_joint_position(joint, -1.0).expect("a call");
         }
-        FollowWish::Towards(still(goal))
+        FollowRequest::Towards(still(goal))
     });
     assert_eq!(end, Ok(FollowEnd::NotFollowing { joint: 4 }));
     assert!((bench.arm.joint_values().expect("a call")[3] + 1.0).abs() < 1e-9, "the other has its way");
@@ -291,16 +291,16 @@ fn nothing_moves_for_another_tip_or_limits_without_sense() {
     let goal = shifted(&bench.tip(), Vector3::new(0.0, 0.1, 0.0));
     let limits = FollowLimits { joint_speed_rad_s: 0.0, ..FollowLimits::default() };
     let mut asked = 0;
-    let mut wish = |_: &FollowMoment| {
+    let mut request = |_: &FollowMoment| {
         asked += 1;
-        FollowWish::Towards(still(goal))
+        FollowRequest::Towards(still(goal))
     };
-    let error = bench.arm.follow(&bench.kinematics, &limits, &mut wish).expect_err("no speed");
+    let error = bench.arm.follow(&bench.kinematics, &limits, &mut request).expect_err("no speed");
     assert!(matches!(error, LinkError::BadMotion { what: "the speed of the joints", .. }), "{error}");
     let tip = bench.arm.sim().get_object("/UR5/Tip").expect("the tip");
     let moved = Pose::<Base, Tip>::from_translation_xyzw([0.0, 0.0, 0.1], [0.0, 0.0, 0.0, 1.0]);
     bench.arm.sim().set_object_pose(tip, ObjectHandle::PARENT, &moved).expect("a call");
-    assert_eq!(bench.follow(&mut wish), Ok(FollowEnd::OtherTip));
+    assert_eq!(bench.follow(&mut request), Ok(FollowEnd::OtherTip));
     assert_eq!(asked, 0);
     assert_eq!(bench.arm.joint_values().expect("a call"), before);
 }
@@ -315,7 +315,7 @@ fn a_goal_that_is_no_pose_is_an_error_with_the_arm_at_rest() {
     let end = bench.follow(&mut |_| {
         seen.look(&mut other);
         let velocity_m_s = Vector3::new(0.0, if seen.points.len() < 8 { 0.0 } else { f64::NAN }, 0.0);
-        FollowWish::Towards(FollowGoal { velocity_m_s, ..goal })
+        FollowRequest::Towards(FollowGoal { velocity_m_s, ..goal })
     });
     assert!(matches!(end, Err(LinkError::BadMotion { what: "the goal", .. })), "{end:?}");
     seen.look(&mut other);
@@ -335,7 +335,7 @@ fn following_ends_when_the_simulation_does() {
         if passes == 5 {
             other.sim().stop_simulation().expect("a call");
         }
-        FollowWish::Towards(goal)
+        FollowRequest::Towards(goal)
     });
     // The start is restored, and nothing is sent after it; nobody else moved the joints.
     assert!(matches!(end, Err(LinkError::NotRunning { state: SimulationState::Stopped, .. })), "{end:?}");
@@ -355,9 +355,9 @@ fn a_client_that_misses_passes_takes_no_larger_steps() {
         points.push(moment.joints);
         times_s.push(moment.sim_time_s);
         if points.len() < 80 {
-            FollowWish::Towards(on_circle(&start, 0.1, 0.2, moment.sim_time_s))
+            FollowRequest::Towards(on_circle(&start, 0.1, 0.2, moment.sim_time_s))
         } else {
-            FollowWish::End
+            FollowRequest::End
         }
     });
     assert_eq!(end, Ok(FollowEnd::Released));
@@ -385,7 +385,7 @@ fn a_client_that_dies_leaves_a_standing_arm() {
                 // Its sockets are closed as the thread unwinds, without a word to the server.
                 std::panic::resume_unwind(Box::new("this client dies"));
             }
-            FollowWish::Towards(goal)
+            FollowRequest::Towards(goal)
         });
     });
     death.recv_timeout(std::time::Duration::from_mins(1)).expect("it moves and dies");

@@ -16,8 +16,8 @@ fn is_held_soon<T: std::fmt::Debug>(what: &str, work: impl FnOnce() -> Result<T,
     let error = work().expect_err(what);
     let LinkError::Held { after } = error else { panic!("{what}: {error}") };
     assert!(after >= Duration::from_secs(3) && started.elapsed() < SOON, "{what}: {:?}", started.elapsed());
-    let said = error.to_string();
-    assert!(said.contains("another client holds it, in stepping mode without a step"), "{said}");
+    let reported = error.to_string();
+    assert!(reported.contains("another client holds it, in stepping mode without a step"), "{reported}");
 }
 
 #[test]

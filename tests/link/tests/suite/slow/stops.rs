@@ -1,7 +1,9 @@
 //! A stop at any instant of any motion leaves an arm that can be moved on, whatever moves its joints.
 
 use handeye_cell::scene::{JointModeSpec, Scene};
-use handeye_coppeliasim::cell::{ArmJog, CellClient, FollowEnd, FollowGoal, FollowLimits, FollowWish, MotionTolerance};
+use handeye_coppeliasim::cell::{
+    ArmJog, CellClient, FollowEnd, FollowGoal, FollowLimits, FollowRequest, MotionTolerance,
+};
 use handeye_coppeliasim::{CancelToken, LinkError, MotionLimits};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_server::{CellConfig, CellServer};
@@ -57,7 +59,7 @@ fn stop_and_go_on(joint_mode: JointModeSpec) {
                 let mut goal = FollowGoal { base_from_tip, velocity_m_s, angular_velocity_rad_s };
                 let end = cell.arm().follow(&kinematics, &FollowLimits::default(), &mut |_| {
                     goal = goal.after(0.05);
-                    if cancel.is_cancelled() { FollowWish::End } else { FollowWish::Towards(goal) }
+                    if cancel.is_cancelled() { FollowRequest::End } else { FollowRequest::Towards(goal) }
                 });
                 end.map(|end| assert_eq!(end, FollowEnd::Released, "{round}"))
             }

@@ -37,12 +37,12 @@ mod tests {
     #[test]
     fn half_a_pixel_comes_with_the_centre_to_give() {
         let given = Some(Intrinsics { cx: 320.0, cy: 240.0, ..Intrinsics::pinhole(640, 480, 600.0) });
-        let said = |half: Option<Vector2<f64>>| {
+        let reported = |half: Option<Vector2<f64>>| {
             let (what, to_do) = centre(given, [-0.47, -0.52], [0.05; 2], half);
-            Text::sentences([what, to_do]).say(English)
+            Text::sentences([what, to_do]).in_language(English)
         };
-        let half = said(Some(Vector2::repeat(-0.5)));
+        let half = reported(Some(Vector2::repeat(-0.5)));
         assert!(half.contains("half a pixel") && half.contains("cx = 319.50 and cy = 239.50"), "{half}");
-        assert!(!said(None).contains("half a pixel"));
+        assert!(!reported(None).contains("half a pixel"));
     }
 }

@@ -206,7 +206,7 @@ fn gross_words(sight: &SessionViews, code: FindingCode, tried: &Tried) -> Option
             .with("has", text!("radians"))
             .with("stated", text!("degrees")),
         FindingCode::WrongLengthUnit if !is_a_thousand(tried.change.unit) => {
-            let factor = factor_said(tried.change.unit);
+            let factor = factor_text(tried.change.unit);
             if factor.contains("25") {
                 text!(
                     "The stated size of the target is {factor} times the true one, by an inch: inches and millimetres were mixed up \
@@ -241,7 +241,7 @@ fn is_a_thousand(unit: f64) -> bool {
 }
 
 /// A factor between units of length as people write it.
-fn factor_said(unit: f64) -> String {
+fn factor_text(unit: f64) -> String {
     if (1.0..30.0).contains(&unit) {
         format!("{unit}")
     } else if unit > 30.0 && unit < 40.0 {
@@ -303,7 +303,7 @@ fn gross_advice(sight: &SessionViews, code: FindingCode) -> Option<Text> {
 /// An accused gross hypothesis as findings, one per code.
 pub(super) fn gross_findings(hypotheses: &[Hypothesis]) -> Vec<Finding> {
     let Some(h) = hypotheses.iter().find(|h| h.accepted) else { return Vec::new() };
-    // The twin is said in the same sentence.
+    // The twin is reported in the same sentence.
     let is_twin = |code: FindingCode| {
         matches!(code, FindingCode::WrongMode | FindingCode::InvertedPoses | FindingCode::InvertedTargetPoses)
     };

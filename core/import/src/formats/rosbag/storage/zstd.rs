@@ -51,10 +51,10 @@ pub(in super::super) fn plain_parts(
 }
 
 fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), Text> {
-    let said = |e: io::Error| foreign(&e);
-    let file = File::open(from).map_err(said)?;
-    let mut out = File::create_new(to).map_err(said)?;
-    let mut input = Decoder::new(file).map_err(said)?;
+    let reported = |e: io::Error| foreign(&e);
+    let file = File::open(from).map_err(reported)?;
+    let mut out = File::create_new(to).map_err(reported)?;
+    let mut input = Decoder::new(file).map_err(reported)?;
     let mut piece = vec![0; PIECE_BYTES];
     let mut is_empty = true;
     loop {
@@ -62,7 +62,7 @@ fn unpack(from: &Path, to: &Path, budget: &Budget<'_>) -> Result<(), Text> {
             Ok(0) => return Ok(()),
             Ok(count) => {
                 budget.unpack(count as u64)?;
-                out.write_all(&piece[..count]).map_err(said)?;
+                out.write_all(&piece[..count]).map_err(reported)?;
                 is_empty = false;
             }
             // One that breaks off has what came before: whoever reads it finds out how far that goes.

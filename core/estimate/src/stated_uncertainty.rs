@@ -12,7 +12,7 @@ use handeye_geometry::se3;
 
 /// Which error may be stated.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Claim {
+pub enum StatedUncertainty {
     /// The model explains the data: the error is that of its covariance.
     AsModelled,
     /// The data support explanations that the answer does not count on.
@@ -38,7 +38,7 @@ impl Alternative {
     }
 }
 
-impl Claim {
+impl StatedUncertainty {
     /// How far explanations that the answer does not count on would move a `point` (camera coordinates, metres), metres;
     /// of several the one that moves it farthest. Zero where there is none.
     pub fn moved_m(&self, point: &Point3<f64>) -> f64 {
@@ -89,16 +89,17 @@ mod tests {
         // A turn of 0.02 rad about x moves the point by a centimetre, a shift along x by three millimetres.
         let turned = along(Vector6::new(0.0, 0.0, 0.0, 0.02, 0.0, 0.0), 1e-5);
         let moved = along(Vector6::new(3e-3, 0.0, 0.0, 0.0, 0.0, 0.0), 1e-3);
-        let error = |claim: &Claim| claim.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).expect("stated");
+        let error =
+            |claim: &StatedUncertainty| claim.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).expect("stated");
         let (plain, wide) = (2.795e-4, 2.795e-3);
-        assert!((error(&Claim::AsModelled) - plain).abs() < 1e-6);
-        assert!((error(&Claim::Moved(vec![turned.clone()])) - (0.01 + plain)).abs() < 2e-6);
-        assert!((error(&Claim::Moved(vec![moved.clone()])) - (3e-3 + wide)).abs() < 2e-6);
-        let both = Claim::Moved(vec![moved, turned]);
+        assert!((error(&StatedUncertainty::AsModelled) - plain).abs() < 1e-6);
+        assert!((error(&StatedUncertainty::Moved(vec![turned.clone()])) - (0.01 + plain)).abs() < 2e-6);
+        assert!((error(&StatedUncertainty::Moved(vec![moved.clone()])) - (3e-3 + wide)).abs() < 2e-6);
+        let both = StatedUncertainty::Moved(vec![moved, turned]);
         assert!((error(&both) - (0.01 + plain)).abs() < 2e-6);
         assert!((both.moved_m(&point) - 0.01).abs() < 1e-6);
         let (moved, rest) = both.parts_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).expect("stated");
         assert!((moved - 0.01).abs() < 1e-6 && moved + rest == error(&both), "the parts are those of one explanation");
-        assert!(Claim::Nothing.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).is_none());
+        assert!(StatedUncertainty::Nothing.error_95_m(&isotropic(1e-4), SmallSample::KNOWN, &point).is_none());
     }
 }

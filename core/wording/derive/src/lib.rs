@@ -1,4 +1,4 @@
-//! `derive(Said)`: an error as a sentence that can be said in any language.
+//! `derive(Localized)`: an error as a sentence that can be reported in any language.
 //!
 //! The sentence is the one that `thiserror` prints: `#[error("…")]` is the template of a `Text`, and its values are those of
 //! the message. A value that is an error of ours is translated as well, and so is a fixed phrase (`&'static str`) of several words; a value with a
@@ -10,13 +10,13 @@ use quote::{format_ident, quote};
 use syn::{Attribute, Data, DeriveInput, Error, Fields, LitStr, Result, Type};
 
 /// `Text::from(&error)`, and the error as a value of other sentences. The package depends on `handeye_wording`.
-#[proc_macro_derive(Said)]
-pub fn derive_said(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
+#[proc_macro_derive(Localized)]
+pub fn derive_localized(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
     let input = syn::parse_macro_input!(input as DeriveInput);
-    said(&input).unwrap_or_else(|error| error.to_compile_error()).into()
+    reported(&input).unwrap_or_else(|error| error.to_compile_error()).into()
 }
 
-fn said(input: &DeriveInput) -> Result<TokenStream> {
+fn reported(input: &DeriveInput) -> Result<TokenStream> {
     let name = &input.ident;
     let arms = match &input.data {
         Data::Enum(data) => {

@@ -8,8 +8,8 @@ use super::judge::Judged;
 use super::model::{Fit, State};
 use super::screen::Candidate;
 use super::select::Selection;
-use crate::claim::{Alternative, Claim};
 use crate::diagnose::findings::FindingCode;
+use crate::stated_uncertainty::{Alternative, StatedUncertainty};
 use crate::{self as estimate, JointFit, ViewStatus};
 use handeye_geometry::frames::{Camera, Mount, Pose};
 use handeye_geometry::se3;
@@ -21,7 +21,7 @@ use handeye_geometry::se3;
 /// calibration misses. A fit of the linear model without the hypotheses is not the answer: where the model is wrong, pose by
 /// pose and all corners together are wrong in different ways. Explanations that are as good as the first are alternatives of
 /// their own.
-pub(super) fn claim(selection: &Selection<'_>, calibration: &estimate::Fit) -> Claim {
+pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estimate::Fit) -> StatedUncertainty {
     let model = &selection.model;
     let counted = |effect: Effect| counts_on(calibration, effect);
     let out: Vec<usize> =
@@ -49,9 +49,9 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &estimate::Fit) -> C
     let others: Vec<&Judged> =
         as_good().filter(|j| !matches!(j.candidate, Candidate::Effect(e) if counted(e))).collect();
     if !missed && others.is_empty() {
-        return Claim::AsModelled;
+        return StatedUncertainty::AsModelled;
     }
-    let Some(answer) = &calibration.hand_eye else { return Claim::Nothing };
+    let Some(answer) = &calibration.hand_eye else { return StatedUncertainty::Nothing };
     let to = |fit: &Fit| alternative(&answer.mount_from_camera(), &model.solution.mount_from_camera, fit);
     let mut alternatives = Vec::new();
     let size = calibration.joint.as_ref().and_then(|joint| joint.size.as_ref());
@@ -59,37 +59,39 @@ pub(super) fn claim(selection: &Selection<'_>, calibration: &estimate::Fit) -> C
         alternatives.push(size.with.clone());
     } else if missed {
         // With so much left out nothing determines the answer.
-        let Some(fit) = model.fit(&with, selection.fit.levels) else { return Claim::Nothing };
+        let Some(fit) = model.fit(&with, selection.fit.levels) else { return StatedUncertainty::Nothing };
         alternatives.push(to(&fit));
     }
     alternatives.extend(others.into_iter().map(|judged| to(&judged.fit)));
-    Claim::Moved(alternatives)
+    StatedUncertainty::Moved(alternatives)
 }
 
 /// What may be stated where sessions share a lens and have several: the answer may be off by what its own would move it.
-pub(super) fn with_own_lens(claim: Claim, calibration: &estimate::Fit) -> Claim {
+pub(super) fn with_own_lens(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
     let shared = calibration.shared_lens.as_ref().filter(|shared| shared.has_others());
     match shared {
-        Some(shared) => also(claim, shared.with_own_lens.clone()),
-        None => claim,
+        Some(shared) => also(stated, shared.with_own_lens.clone()),
+        None => stated,
     }
 }
 
 /// What may be stated where the robot's field leaves the size of the target open: a size that is off as prints and rulers are would
 /// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it.
-pub(super) fn with_open_size(claim: Claim, calibration: &estimate::Fit) -> Claim {
+pub(super) fn with_open_size(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
     let size = calibration.joint.as_ref().and_then(JointFit::open_size);
     match size {
-        Some(size) => also(claim, size.with.clone()),
-        None => claim,
+        Some(size) => also(stated, size.with.clone()),
+        None => stated,
     }
 }
 
-fn also(claim: Claim, alternative: Alternative) -> Claim {
-    match claim {
-        Claim::Nothing => Claim::Nothing,
-        Claim::AsModelled => Claim::Moved(vec![alternative]),
-        Claim::Moved(alternatives) => Claim::Moved(alternatives.into_iter().chain([alternative]).collect()),
+fn also(stated: StatedUncertainty, alternative: Alternative) -> StatedUncertainty {
+    match stated {
+        StatedUncertainty::Nothing => StatedUncertainty::Nothing,
+        StatedUncertainty::AsModelled => StatedUncertainty::Moved(vec![alternative]),
+        StatedUncertainty::Moved(alternatives) => {
+            StatedUncertainty::Moved(alternatives.into_iter().chain([alternative]).collect())
+        }
     }
 }
 

@@ -21,18 +21,18 @@ pub fn check(problem: &JointProblem<'_>, solution: &JointSolution, work: &Work<'
     let fitted = solution.linearised(problem)?;
     let reported = reported(problem, solution, work.cancel)?;
     let of_view = |(block, correction): (&ViewBlock, &Vector6<f64>)| block.information(&solution.noise, correction);
-    let told: Vec<_> = fitted.blocks.iter().zip(&fitted.corrections).map(of_view).collect();
-    let all = told
+    let stated: Vec<_> = fitted.blocks.iter().zip(&fitted.corrections).map(of_view).collect();
+    let all = stated
         .iter()
         .flatten()
         .fold(fitted.prior_information(&solution.noise), |sum, (information, _)| sum + information);
-    let mut pairs = Vec::with_capacity(told.len());
-    for (told, seen) in told.iter().zip(&reported.blocks) {
+    let mut pairs = Vec::with_capacity(stated.len());
+    for (stated, seen) in stated.iter().zip(&reported.blocks) {
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
         // A view without which there is no answer cannot be predicted.
-        let Some((information, gradient)) = told else { continue };
+        let Some((information, gradient)) = stated else { continue };
         let Some(covariance) = covariance_of(&(&all - information)) else { continue };
         pairs.push(squares(seen, &(&covariance * gradient), &covariance, &solution.noise));
     }

@@ -76,13 +76,13 @@ pub(crate) fn columns(place: &Vector3<f64>, by_robot: &Matrix6<f64>) -> DMatrix<
 
 /// The error of the tip as an affine function of its place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RobotField {
+pub struct PoseDependentError {
     places: Places,
     /// Metres and radians at a distance of the RMS spread of the places.
     slopes: [f64; SLOPES],
 }
 
-impl RobotField {
+impl PoseDependentError {
     /// By its origin and its reach \[m\] and its slopes, as [`Self::position_slopes`] and [`Self::orientation_slopes`] give them.
     pub fn new(
         origin_m: Vector3<f64>,
@@ -158,7 +158,11 @@ impl RobotField {
 
 /// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints, none
 /// where they are empty, and its field.
-pub fn corrected_base_from_tip(view: &View, offsets_rad: &[f64], field: Option<&RobotField>) -> Pose<Base, Tip> {
+pub fn corrected_base_from_tip(
+    view: &View,
+    offsets_rad: &[f64],
+    field: Option<&PoseDependentError>,
+) -> Pose<Base, Tip> {
     let by_joints = base_from_tip_by_joints(view, offsets_rad);
     field.map_or(by_joints, |field| {
         let correction = correction_transform(&field.correction(&view.base_from_tip));
@@ -181,7 +185,7 @@ mod tests {
     #[test]
     fn the_columns_are_the_correction_by_the_slopes_and_the_formula_is_the_documented_one() {
         let poses = poses();
-        let mut field = RobotField::none(Places::of(poses.iter()).expect("they are apart"));
+        let mut field = PoseDependentError::none(Places::of(poses.iter()).expect("they are apart"));
         for (k, slope) in field.slopes_mut().iter_mut().enumerate() {
             *slope = 1e-3 * (k as f64 + 1.0);
         }
@@ -193,7 +197,7 @@ mod tests {
             let from_origin = pose.translation() - field.origin_m();
             assert!((field.position_slopes() * from_origin - correction.fixed_rows::<3>(0)).norm() < 1e-15);
             assert!((field.orientation_slopes() * from_origin - correction.fixed_rows::<3>(3)).norm() < 1e-15);
-            let read = RobotField::new(
+            let read = PoseDependentError::new(
                 field.origin_m(),
                 field.reach_m(),
                 &field.position_slopes(),

@@ -20,7 +20,7 @@ fn bend(t: &mut Session, per_metre: f64) {
     }
 }
 
-fn solve(t: &Session, free: bool) -> (JointSolution, Widening) {
+fn solve(t: &Session, free: bool) -> (JointSolution, Overdispersion) {
     let problem = t.problem(free, None);
     let solution = estimate(&problem, &t.start(), &CancelToken::default()).expect("solves");
     let widening = check(&problem, &solution, &CancelToken::default()).expect("checks");
@@ -101,7 +101,7 @@ fn the_check_is_the_same_every_time_and_says_nothing_of_few_views() {
     let t = trial(Mode::EyeToHand, 9, &REALISTIC, camera(), 5);
     assert_eq!(solve(&t, false).1, solve(&t, false).1);
     let t = trial(Mode::EyeToHand, 5, &REALISTIC, camera(), 5);
-    assert_eq!(solve(&t, false).1, Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() });
+    assert_eq!(solve(&t, false).1, Overdispersion { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() });
 }
 
 /// `HANDEYE_TRIALS` makes a study of it, of minutes, with that many sessions of each kind.

@@ -1,7 +1,7 @@
 //! Whether the stated uncertainty is true to the data, and by how much it has to be widened where it is not.
 //!
 //! The covariance of the joint estimate holds if the errors of all views are independent and as large as the noise levels
-//! say. Robot errors that are affine in the place are part of the estimate ([`RobotField`]); what else neighbouring poses
+//! say. Robot errors that are affine in the place are part of the estimate ([`PoseDependentError`]); what else neighbouring poses
 //! have in common, and what lens and board do not follow of their models, comes back in every image, so it may be too small. Nothing but the data can tell. Each of the checks here
 //! compares what they show with what the covariance promises and gives a ratio of variances with the probability of
 //! one so large if the covariance were true:
@@ -18,7 +18,7 @@
 //! on the lens ([`of_lens`]). All of it is done on the equations linearised at the solution: leaving a
 //! view out takes a product of small matrices, not another fit.
 //!
-//! [`RobotField`]: crate::handeye::joint::RobotField
+//! [`PoseDependentError`]: crate::handeye::joint::RobotField
 //!
 //! # Reference
 //! Künsch 1989, "The jackknife and the bootstrap for general stationary observations"; Moran 1950, "Notes on
@@ -98,7 +98,7 @@ impl Check {
 
 /// By how much a covariance has to be widened, and why.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Widening {
+pub struct Overdispersion {
     /// What the covariance is to be multiplied by, 1 or more.
     pub factor: f64,
     /// Which evidence asks for it; `None` where none refutes the covariance as it is.
@@ -124,10 +124,10 @@ pub fn check<'a>(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
     work: impl Into<Work<'a>>,
-) -> Result<Widening, HandEyeError> {
+) -> Result<Overdispersion, HandEyeError> {
     let work = work.into();
     if problem.views.len() < NEED {
-        return Ok(Widening { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() });
+        return Ok(Overdispersion { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() });
     }
     let views = linear::views(problem, solution, &work)?;
     let mut checks =
@@ -139,7 +139,7 @@ pub fn check<'a>(
     let largest = of_all.into_iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
     let (factor, by) = (largest.map_or(1.0, |c| c.ratio), largest.map(|c| c.by));
     let lens = of_lens.first().map_or(1.0, |c| c.ratio);
-    Ok(Widening { factor, by, lens, checks })
+    Ok(Overdispersion { factor, by, lens, checks })
 }
 
 #[cfg(test)]
