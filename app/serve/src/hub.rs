@@ -126,7 +126,7 @@ struct Page {
     reads: bool,
     /// Whether it has the latest frame and takes another.
     ready: bool,
-    page_requests: tokio::sync::mpsc::Sender<PageRequest>,
+    requests: tokio::sync::mpsc::Sender<PageRequest>,
 }
 
 /// Errands that wait for a page.
@@ -182,7 +182,14 @@ impl Hub {
         let (page_requests, page_requests_here) = tokio::sync::mpsc::channel(MOST_PAGE_REQUESTS);
         state.pages.insert(
             id,
-            Page { name: name.to_owned(), screen: None, visible: true, reads: false, ready: true, page_requests },
+            Page {
+                name: name.to_owned(),
+                screen: None,
+                visible: true,
+                reads: false,
+                ready: true,
+                requests: page_requests,
+            },
         );
         let comes_back = state.driver.is_none() && state.drove.as_deref() == Some(name);
         if drove || comes_back || id == FIRST {
@@ -376,11 +383,11 @@ impl Hub {
     }
 
     /// Something for the page that drives.
-    pub fn send(&self, errand: PageRequest) {
+    pub fn send(&self, request: PageRequest) {
         let state = self.state();
         let driver = state.driver.and_then(|id| state.pages.get(&id));
-        if driver.is_some_and(|page| page.page_requests.try_send(errand).is_err()) {
-            tracing::debug!("a page takes no errands");
+        if driver.is_some_and(|page| page.requests.try_send(request).is_err()) {
+            tracing::debug!("a page takes no requests");
         }
     }
 

@@ -176,7 +176,7 @@ async fn write(
                 }
                 json(&ServerMessage::Controls { controls: &controls })
             }
-            Some(errand) = page_requests.recv() => json(&errand),
+            Some(request) = page_requests.recv() => json(&request),
             changed = acknowledged.changed() => {
                 if changed.is_err() {
                     return "ended";

@@ -212,7 +212,7 @@ impl Window {
             match command {
                 // A browser has the file manager of another machine.
                 Command::Session(session::Command::OpenFolder(folder)) if self.app.model().in_browser => {
-                    ctx.open_url(download(&folder))
+                    ctx.open_url(download(&folder));
                 }
                 Command::Recording(recording::Command::OpenRerun) if self.app.model().in_browser => {
                     ctx.open_url(egui::OpenUrl::new_tab(handeye_workbench::recording::BROWSER_PATH));

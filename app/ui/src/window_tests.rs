@@ -458,7 +458,7 @@ fn every_pane_and_dialog_shows_nothing_but_letters_that_the_fonts_have() {
             silent.command(shell::Command::SetLanguage(language));
             silent.command(shell::Command::SetTheme(theme));
             for view in &views {
-                silent.command(view.clone());
+                silent.command(*view);
                 let mut found = Vec::new();
                 silent.harness.output().shapes.iter().for_each(|clipped| texts(&clipped.shape, &mut found));
                 assert!(found.len() > 20, "{view:?} {language:?}: nothing is drawn");

@@ -40,18 +40,18 @@ pub fn size(file: &mut (impl Read + Seek)) -> Result<Size, ImageFileError> {
 
 fn bytes<const N: usize>(file: &mut impl Read) -> Result<[u8; N], ImageFileError> {
     let mut read = [0; N];
-    file.read_exact(&mut read).map_err(failure)?;
+    file.read_exact(&mut read).map_err(|error| failure(&error))?;
     Ok(read)
 }
 
 fn go_to(file: &mut impl Seek, place: SeekFrom) -> Result<(), ImageFileError> {
-    file.seek(place).map(drop).map_err(failure)
+    file.seek(place).map(drop).map_err(|error| failure(&error))
 }
 
-fn failure(error: io::Error) -> ImageFileError {
+fn failure(error: &io::Error) -> ImageFileError {
     match error.kind() {
-        ErrorKind::UnexpectedEof => ImageFileError::Truncated(foreign(&error)),
-        _ => ImageFileError::Unreadable(foreign(&error)),
+        ErrorKind::UnexpectedEof => ImageFileError::Truncated(foreign(error)),
+        _ => ImageFileError::Unreadable(foreign(error)),
     }
 }
 

@@ -12,7 +12,7 @@ use handeye_estimate::diagnose::doctor::Diagnosis;
 use handeye_estimate::diagnose::findings::FindingCode;
 use handeye_estimate::diagnose::{Calibration, calibrate};
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::uncertainty::{quality, widening};
+use handeye_estimate::uncertainty::{overdispersion, quality};
 use handeye_estimate::{JointFit, Method, Observations};
 use handeye_geometry::progress::CancelToken;
 use nalgebra::{DMatrix, Matrix6};

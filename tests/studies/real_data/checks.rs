@@ -1,7 +1,7 @@
 //! What the checks of the stated uncertainty say of every set.
 
 use handeye_estimate::handeye::joint::Free;
-use handeye_estimate::uncertainty::{quality, widening};
+use handeye_estimate::uncertainty::{overdispersion, quality};
 use handeye_geometry::progress::CancelToken;
 
 use crate::methods::Choice;

@@ -1,7 +1,7 @@
 //! Whether the answers of random halves agree as well as they say.
 
 use handeye_estimate::handeye::joint::{Free, JointSolution, SmallSample};
-use handeye_estimate::uncertainty::{quality, widening};
+use handeye_estimate::uncertainty::{overdispersion, quality};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
 use nalgebra::{Matrix6, Point3};

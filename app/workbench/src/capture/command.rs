@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait};
 
 /// What the user wants of captures.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {

@@ -6,7 +6,7 @@ use crate::guided::state::ChoiceOutcome;
 use crate::model::MotionId;
 
 /// What the user wants of guided capture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {

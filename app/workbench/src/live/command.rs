@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::{DepthScale, FrameImages, FrameInfo, ImagePoint, LiveDetection, Overlays, Viewport};
 
 /// What the user wants of the live images.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
@@ -28,6 +28,7 @@ pub enum Command {
 
 /// What has happened to the live images.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[expect(clippy::large_enum_variant, reason = "nearly all of them are frames")]
 pub enum Event {
     /// New images.
     Frame {

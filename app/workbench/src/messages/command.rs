@@ -6,7 +6,7 @@ use crate::model::Severity;
 use crate::text::Text;
 
 /// What the user wants of messages.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {

@@ -38,7 +38,7 @@ fn reported(desk: &MotionQueue) -> Vec<(u64, String)> {
             Event::JogEnded { why } => {
                 (0, why.map_or_else(|| "released".to_owned(), |why| why.in_language(Language::English)))
             }
-            other => panic!("{other:?}"),
+            Event::Stopped => panic!("nobody stopped the arm"),
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::SceneView;
 
 /// What the user wants of the 3D pane.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {

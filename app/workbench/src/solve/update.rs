@@ -192,7 +192,6 @@ pub(crate) fn chosen_box(model: &Model) -> Option<TipBox> {
 
 /// Some milliseconds, so only when box or answer are others.
 fn judge_tip_box(model: &mut Model) {
-    let model = model;
     let judged = model.solve.solved.as_deref().and_then(|it| judge_box(model.tip_box.chosen, it, model.document()));
     model.tip_box.judged = judged;
 }

@@ -8,7 +8,7 @@ use crate::model::{BoardMotion, FollowRequest, FollowStatus, Tracked};
 use crate::text::Text;
 
 /// What the user wants of tracking and following the board.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {

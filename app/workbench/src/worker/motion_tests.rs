@@ -368,7 +368,7 @@ fn following_moves_to_where_there_is_room_first_when_that_is_wished_and_needed()
     tracked(&bench);
     let joints = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
     let follow = |bench: &Bench, id, requested| {
-        bench.workers.follow(MotionId(id), requested, 0.25).expect("the worker is there")
+        bench.workers.follow(MotionId(id), requested, 0.25).expect("the worker is there");
     };
     follow(&bench, 1, FollowRequest::KeepViewWithRoom);
     bench.moved(1);

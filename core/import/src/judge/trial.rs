@@ -37,6 +37,9 @@ const MOST_VIEWS: usize = 400;
 /// Views that disagree for which a pose that fits better is looked for among all.
 const MOST_LOOKED_FOR: usize = 50;
 
+/// What was seen of a source, by how its poses were read where they are a series.
+type SightsRead = HashMap<(Source, Option<(Reading, Direction)>), Rc<Sight>>;
+
 /// What hypotheses are tried with.
 pub(super) struct Judge<'a> {
     pub recording: &'a Recording,
@@ -45,7 +48,7 @@ pub(super) struct Judge<'a> {
     pub settings: &'a Settings,
     pub cancel: &'a CancelToken,
     /// What was seen, with what was read already of series: many cases share them.
-    pub read: RefCell<HashMap<(Source, Option<(Reading, Direction)>), Rc<Sight>>>,
+    pub read: RefCell<SightsRead>,
     /// Series of which it was found that their poses are a camera's own, and why: no robot's for any other camera either.
     pub own: RefCell<BTreeMap<usize, Text>>,
 }

@@ -241,7 +241,7 @@ impl Loop {
             CloseReason::Closed | CloseReason::Broken(_) => tracing::debug!(%why, "a connection has ended"),
             CloseReason::Slowest => tracing::warn!(%why, "a connection is closed"),
             CloseReason::Violation(_) | CloseReason::NoIntroduction | CloseReason::Silent => {
-                tracing::info!(%why, "a connection is closed")
+                tracing::info!(%why, "a connection is closed");
             }
         }
         self.engine.disconnected(&peer(token), self.started.elapsed());

@@ -96,6 +96,7 @@ impl Direction {
     pub const ALL: [Self; 2] = [Self::Forward, Self::Inverse];
 
     /// The other one.
+    #[must_use]
     pub fn other(self) -> Self {
         match self {
             Self::Forward => Self::Inverse,
@@ -104,6 +105,7 @@ impl Direction {
     }
 
     /// Which way `anchor_from_mount` is what is written of the robot: the mount moves the other way where the camera stands beside it.
+    #[must_use]
     pub fn of_mount(self, mode: Mode) -> Self {
         if mode == Mode::EyeInHand { self } else { self.other() }
     }
