@@ -6,7 +6,7 @@
 //! result is the optimum of all sessions together, found in rounds over the sessions
 //! (`handeye/joint/shared_lens.rs`).
 //!
-//! A session counts for as much less as its own data refute its covariance ([`widening`]).
+//! A session counts for as much less as its own data refute its covariance ([`overdispersion`]).
 //!
 //! # Needs
 //! Two sessions or more, each enough for a calibration by itself with an estimated lens, of one image size and lens model.

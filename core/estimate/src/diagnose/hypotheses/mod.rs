@@ -7,7 +7,7 @@
 //!
 //! # How it is scored
 //! Under each of them the closed forms are solved, and the distance between where the chain puts the target's outer points and
-//! where the camera saw them is measured at the median view ([`agreement`]). That is on the camera's side, in metres, so it
+//! where the camera saw them is measured at the median view ([`agreement()`]). That is on the camera's side, in metres, so it
 //! means the same under every unit of the robot's poses. Hypotheses are compared by their *misfit*: it over the target's distance.
 //!
 //! | threshold | |

@@ -21,7 +21,7 @@ const NEARLY: f64 = 0.8;
 /// read to half a millimetre on a square of some twenty.
 pub(crate) const SIZE_SIGMA: f64 = 0.03;
 
-/// The estimate from `views` with a [`PoseDependentError`](super::RobotField), when they show one; `without` is their estimate
+/// The estimate from `views` with a [`PoseDependentError`](super::PoseDependentError), when they show one; `without` is their estimate
 /// without it. `None` also when the noise levels are given, and with fewer than ten views.
 ///
 /// A target of another size than stated looks like a field that grows with the distance. So the field has to be likelier

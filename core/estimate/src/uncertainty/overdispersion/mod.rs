@@ -18,7 +18,7 @@
 //! on the lens ([`of_lens`]). All of it is done on the equations linearised at the solution: leaving a
 //! view out takes a product of small matrices, not another fit.
 //!
-//! [`PoseDependentError`]: crate::handeye::joint::RobotField
+//! [`PoseDependentError`]: crate::handeye::joint::PoseDependentError
 //!
 //! # Reference
 //! Künsch 1989, "The jackknife and the bootstrap for general stationary observations"; Moran 1950, "Notes on
