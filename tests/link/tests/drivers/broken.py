@@ -44,7 +44,8 @@ def state():
     elif fault == "degrees":
         message["joints_rad"] = [90.0]
     elif fault == "stamps back":
-        message["stamp"] = 1000.0 - now()
+        # The clock begins at 100: never ahead of it, which would be another fault.
+        message["stamp"] = 200.0 - now()
     elif fault == "frozen stamps":
         message["stamp"] = 100.0
     elif fault == "other clock":
