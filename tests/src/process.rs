@@ -19,18 +19,18 @@ pub fn start(arguments: &[&str]) -> (Child, BufReader<ChildStderr>) {
         .stderr(Stdio::piped())
         .spawn()
         .expect("handeye runs");
-    let reported = BufReader::new(child.stderr.take().expect("its messages"));
-    (child, reported)
+    let stderr = BufReader::new(child.stderr.take().expect("its messages"));
+    (child, stderr)
 }
 
 /// Reads what a process says until something is reported.
 ///
 /// # Panics
 /// When it ends before.
-pub fn until_message(reported: &mut BufReader<ChildStderr>, what: &str) {
+pub fn until_message(stderr: &mut BufReader<ChildStderr>, what: &str) {
     let mut all = String::new();
     while !all.contains(what) {
-        assert!(reported.read_line(&mut all).is_ok_and(|bytes| bytes > 0), "{all}");
+        assert!(stderr.read_line(&mut all).is_ok_and(|bytes| bytes > 0), "{all}");
     }
 }
 

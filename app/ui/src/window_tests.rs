@@ -507,7 +507,7 @@ fn the_same_warning_is_on_the_screen_once() {
     let mut model = app.model().clone();
     model.track.follow = handeye_workbench::model::FollowStatus::Ended(text.clone());
     let (home, now_s) = (handeye_workbench::model::Home::Pane(Pane::Track), model.now_s);
-    model.messages.say_at(home, handeye_workbench::model::Severity::Warning, text, now_s);
+    model.messages.notify_at(home, handeye_workbench::model::Severity::Warning, text, now_s);
     silent.show_model(model);
     assert_eq!(count(&silent), 1, "in its pane");
     silent.show(Pane::Jog);
@@ -525,7 +525,7 @@ fn why_there_is_no_capture_is_on_the_screen_once_and_the_table_keeps_it() {
     let reported = handeye_wording::text!("No capture: {why}", why = why.clone());
     let at_s = model.now_s;
     let home = handeye_workbench::model::Home::Pane(Pane::Colour);
-    model.messages.say_at(home, handeye_workbench::model::Severity::Warning, reported, at_s);
+    model.messages.notify_at(home, handeye_workbench::model::Severity::Warning, reported, at_s);
     let kind = handeye_workbench::model::RefusalKind::NoBoard;
     model.refused = Some(handeye_workbench::model::CaptureRefused { kind, why, at_s });
     silent.show_model(model.clone());
@@ -545,7 +545,7 @@ fn the_line_at_the_bottom_says_what_is_under_way_and_old_news_no_more() {
     let mut model = handeye_workbench::testing::sample::solved();
     let now_s = model.now_s;
     let say = |model: &mut Model, at_s| {
-        model.messages.say(
+        model.messages.notify(
             handeye_workbench::model::Severity::Info,
             handeye_workbench::text::Text::verbatim(news),
             at_s,

@@ -292,7 +292,7 @@ fn of_each<T: Send>(
 mod tests {
     use super::*;
 
-    /// A board of ten columns that is reported to have nine looks like one where the border of an image hides a column.
+    /// A board of ten columns that is stated to have nine looks like one where the border of an image hides a column.
     #[test]
     fn a_board_with_a_column_more_is_named_although_some_images_hide_it() {
         let grid = Grid { columns: 9, rows: 7, square_m: 0.02 };

@@ -90,7 +90,7 @@ fn has_words(text: &str) -> bool {
 /// The messages of errors that reach the window, with the places where they stand.
 fn errors() -> BTreeMap<String, PathBuf> {
     let mut errors = BTreeMap::new();
-    for (file, source) in all_sources().into_iter().filter(|(_, source)| source.contains("Said)]")) {
+    for (file, source) in all_sources().into_iter().filter(|(_, source)| source.contains("Localized)]")) {
         for (at, attribute) in source.match_indices("#[error(") {
             let message = source[at + attribute.len()..].trim_start();
             if message.starts_with('"')

@@ -262,7 +262,7 @@ pub enum DatasetProblem {
         /// Rows of the target.
         rows: usize,
     },
-    /// A corner beside the image it is reported to be in.
+    /// A corner beside the image it is stated to be in.
     #[error("({u_px}, {v_px}) is outside of the image of {of} px", of = self::size(*size))]
     OutsideImage {
         /// Column in pixels.

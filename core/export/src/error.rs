@@ -104,7 +104,7 @@ pub enum ExportError {
         /// Their name.
         name: String,
     },
-    /// Where the optical frame is reported to be is no place.
+    /// Where the optical frame is stated to be is no place.
     #[error(
         "the optical frame in the camera link, {translation_m:?} m and {rotation_xyzw:?} xyzw, is not a pose: it needs \
          finite numbers and a unit quaternion"

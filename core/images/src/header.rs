@@ -1,4 +1,7 @@
 //! Width and height out of the header of an image file, for which no decoder is needed.
+//!
+//! `imagesize` 0.15 does the same, but it takes the height of a BMP that is written from the top down for almost 2³² rows,
+//! and no fill bytes between the segments of a JPEG.
 
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 

@@ -114,7 +114,7 @@ fn the_same_poses_in_two_files_are_one_hypothesis_that_names_both() {
     assert!(judgement.hypotheses.iter().any(|h| names(h) != names(&judgement.hypotheses[0])));
 }
 
-/// A board that is reported to be a seventh larger than it is leaves a few per cent of its distance, which a poor recording does, too.
+/// A board that is stated to be a seventh larger than it is leaves a few per cent of its distance, which a poor recording does, too.
 #[test]
 fn a_target_of_another_size_than_the_robot_has_seen_is_named_with_its_size() {
     let reported = |session: &Observations, factor: f64| {

@@ -255,7 +255,7 @@ fn corners_in_json_become_the_corners_of_a_data_set() {
     }
 }
 
-/// The size of the images is reported by the files or by a person, and by nothing else.
+/// The size of the images is stated by the files or by a person, and by nothing else.
 #[test]
 fn the_size_of_images_that_are_not_there_is_never_guessed() {
     let session = observed(Mode::EyeInHand, VIEWS, 37);

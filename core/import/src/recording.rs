@@ -212,9 +212,9 @@ pub struct Sample {
 pub struct JointSeries {
     /// As it is told of.
     pub name: String,
-    /// Names of the joints in the order of the values, where they are reported.
+    /// Names of the joints in the order of the values, where they are stated.
     pub joints: Vec<String>,
-    /// Of the values of revolute joints, where it is reported.
+    /// Of the values of revolute joints, where it is stated.
     pub unit: Option<Known<AngleUnit>>,
     /// In the order of the file.
     pub samples: Vec<JointSample>,

@@ -59,7 +59,7 @@ impl Sight {
         Ok(Self { seen, covariances, target, intrinsics: views.intrinsics })
     }
 
-    /// From points that another program has found; the size of the images is reported by the files or by a person.
+    /// From points that another program has found; the size of the images is stated by the files or by a person.
     ///
     /// # Errors
     /// A sentence, where nobody says the size, the points are not those of the target, or give no poses.

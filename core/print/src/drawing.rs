@@ -12,7 +12,7 @@ const DOT: f64 = 0.25;
 const LARGER_DOT: f64 = 0.375;
 /// Radius of a shifted dot as a part of the distance between rows: the nearest dot is 1.41 of it away.
 const SHIFTED_DOT: f64 = 0.35;
-/// Border of a tag on a board of tags where it is not reported: Kalibr's.
+/// Border of a tag on a board of tags where it is not stated: Kalibr's.
 const KALIBR_BORDER: usize = 2;
 
 /// Something black, metres in the target frame (x along columns, y along rows, that is, downwards on paper).

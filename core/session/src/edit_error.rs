@@ -47,7 +47,7 @@ pub enum EditError {
     /// Two taught poses of one name.
     #[error("two taught poses have the name {0:?}: names tell poses apart, so give one of them another")]
     SamePoseName(String),
-    /// What is reported to be done to the taught poses is not what the poses say.
+    /// What is stated to be done to the taught poses is not what the poses say.
     #[error("the taught poses do not show what was done to them ({0}): send all poses as they are afterwards")]
     TaughtChange(TaughtChange),
     /// A value that a session must not have.

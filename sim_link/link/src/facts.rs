@@ -126,7 +126,7 @@ pub enum Simulation {
 pub struct RobotState {
     /// The tip as the controller reports it.
     pub base_from_tip: Pose<Base, Tip>,
-    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\]; none where they are not reported.
+    /// Positions of the joints from the base up \[rad, or m of a prismatic joint\]; none where they are not stated.
     pub joints_rad: JointValues,
     /// Simulated time \[s\]; of a robot behind a driver, time of the workbench.
     pub sim_time_s: f64,

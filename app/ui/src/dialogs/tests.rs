@@ -119,7 +119,7 @@ fn the_dialog_closes_when_the_session_is_there_and_says_why_when_it_is_not() {
     assert!(!pane.commands().contains(&Command::Shell(shell::Command::SetDialog(None))), "it is still being opened");
     pane.model().opening = false;
     let text = Text::verbatim("The session is of a later version.");
-    pane.model().messages.say(Severity::Error, text, 100.0);
+    pane.model().messages.notify(Severity::Error, text, 100.0);
     pane.steps();
     assert!(pane.sees("The session is of a later version."));
     assert!(pane.commands().is_empty());

@@ -126,7 +126,7 @@ mod tests {
     fn messages_go_by_themselves_but_errors_wait_for_the_user() {
         let mut model = Model::new(CellSource::default(), ViewSettings::default());
         for severity in [Severity::Info, Severity::Warning, Severity::Error] {
-            model.messages.say_at(Home::Toast, severity, Text::verbatim("so it is"), 10.0);
+            model.messages.notify_at(Home::Toast, severity, Text::verbatim("so it is"), 10.0);
         }
         let layout = Layout::default();
         let seen = |model: &Model| up(model, &layout).into_iter().map(|message| message.severity).collect::<Vec<_>>();
@@ -146,7 +146,7 @@ mod tests {
         model.now_s = 10.0;
         let homes = [Home::Pane(Pane::Track), Home::Connection, Home::StatusLine];
         for home in homes {
-            model.messages.say_at(home, Severity::Warning, Text::verbatim(format!("{home:?}")), 10.0);
+            model.messages.notify_at(home, Severity::Warning, Text::verbatim(format!("{home:?}")), 10.0);
         }
         let mut layout = Layout::default();
         layout.show(Pane::Jog);

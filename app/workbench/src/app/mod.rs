@@ -113,7 +113,7 @@ impl App {
         };
         let cx = &mut app.cx;
         if let Some(fault) = fault {
-            cx.model.say(Severity::Error, fault);
+            cx.model.notify(Severity::Error, fault);
         }
         prepare_session(&mut cx.model, &cx.desk);
         send_target(&mut cx.model, &cx.workers);
@@ -197,7 +197,7 @@ impl App {
         let Self { cx, connector, recording, reach, .. } = self;
         let reach = reach.as_ref();
         if let Some(why) = reach.and_then(|reach| reach.refusal(&command)) {
-            return cx.model.say(Severity::Warning, why);
+            return cx.model.notify(Severity::Warning, why);
         }
         let Context { model, workers, desk, numbers } = cx;
         match command {
@@ -261,7 +261,7 @@ impl App {
     /// Has the settings written.
     pub fn write_settings(&mut self, settings: SettingsWrite) {
         let asked = self.cx.desk.files(FileTask::Settings(settings));
-        self.cx.model.say_if_refused(text!("The settings were not written"), asked);
+        self.cx.model.notify_if_refused(text!("The settings were not written"), asked);
     }
 }
 

@@ -64,7 +64,7 @@ fn guide_by_hand(cx: &mut Context) {
 /// No more views.
 fn stop_guiding(model: &mut Model) {
     if model.by_hand.take().is_some() {
-        model.say(Severity::Info, text!("Guiding has ended; what was captured is kept"));
+        model.notify(Severity::Info, text!("Guiding has ended; what was captured is kept"));
     }
 }
 
@@ -206,8 +206,8 @@ fn guiding_finished(model: &mut Model) {
 fn guiding_ends(model: &mut Model, severity: Severity, why: Text) {
     model.by_hand = None;
     match severity {
-        Severity::Info => model.say(severity, why),
-        _ => model.in_language_of(Pane::Poses, severity, why),
+        Severity::Info => model.notify(severity, why),
+        _ => model.notify_in(Pane::Poses, severity, why),
     }
 }
 

@@ -60,7 +60,7 @@ pub(crate) fn capture(
         model.refused = None;
     }
     let has_begun = asked.is_ok();
-    model.say_if_refused(text!("There is no capture"), asked);
+    model.notify_if_refused(text!("There is no capture"), asked);
     if !has_begun && model.sequence_runs {
         break_off(model, None);
     }
@@ -71,7 +71,7 @@ pub(crate) fn refuses_without_robot(model: &mut Model) -> bool {
     let refuses = model.document().mode().is_none();
     if refuses {
         let why = text!("This session has images without a robot: begin a new session for captures");
-        model.say(Severity::Warning, why);
+        model.notify(Severity::Warning, why);
     }
     refuses
 }
@@ -79,7 +79,7 @@ pub(crate) fn refuses_without_robot(model: &mut Model) -> bool {
 pub(crate) fn cancel_capture(model: &mut Model, workers: &Workers) {
     if model.capture.is_some() {
         let asked = workers.ask_vision(VisionTask::CancelCapture);
-        model.say_if_refused(text!("The capture was not cancelled"), asked);
+        model.notify_if_refused(text!("The capture was not cancelled"), asked);
     }
 }
 
@@ -95,7 +95,7 @@ fn capture_refused(cx: &mut Context, number: u64, refused: CaptureRefused) {
     }
     cx.model.capture = None;
     let reported = text!("No capture: {why}", why = refused.why.clone());
-    cx.model.in_language_of(Pane::Colour, Severity::Warning, reported);
+    cx.model.notify_in(Pane::Colour, Severity::Warning, reported);
     sequence_refused(cx, &refused);
     cx.model.refused = Some(refused);
 }
@@ -117,7 +117,7 @@ fn captured(cx: &mut Context, number: u64, id: CaptureId) {
         (Some(settled), None) => text!("Capture {id} is kept (settled in {settled} s)", id = id, settled = settled),
         (None, _) => text!("Capture {id} is kept", id = id),
     };
-    cx.model.say(Severity::Info, text);
+    cx.model.notify(Severity::Info, text);
     let role = cx.model.document().capture(id).map(|it| it.role);
     sequence_captured(cx);
     captured_by_hand(&mut cx.model, role);

@@ -62,7 +62,7 @@ fn robot_read(model: &mut Model, robot: RobotState) {
 
 fn start_simulation(model: &mut Model, workers: &Workers) {
     let asked = workers.ask_control(Request::Do(ControlTask::StartSimulation));
-    model.say_if_refused(text!("The simulation was not started"), asked);
+    model.notify_if_refused(text!("The simulation was not started"), asked);
 }
 
 /// Tries now what is being tried. A connection that works is made again, because the scene may be another one.
@@ -71,13 +71,13 @@ fn reconnect(cx: &mut Context, connector: &Connector) {
         return connect(cx, connector, cx.model.source.clone());
     }
     let asked = cx.workers.reconnect();
-    cx.model.say_if_refused(text!("The connection was not tried again"), asked);
+    cx.model.notify_if_refused(text!("The connection was not tried again"), asked);
 }
 
 /// Starts drivers that are gone no more.
 fn stop_trying(model: &mut Model, workers: &Workers) {
     let asked = workers.stop_trying();
-    model.say_if_refused(text!("Trying to connect was not stopped"), asked);
+    model.notify_if_refused(text!("Trying to connect was not stopped"), asked);
 }
 
 /// Works with another cell. What is open stays open: a session belongs to its captures, not to a connection.
@@ -118,7 +118,7 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
             }
         }
         Err(error) => {
-            cx.model.say(Severity::Error, text!("The connection could not be started: {error}", error = error));
+            cx.model.notify(Severity::Error, text!("The connection could not be started: {error}", error = error));
         }
     }
     cx.model.source = source;
@@ -145,7 +145,7 @@ fn set_objects(cx: &mut Context, connector: &Connector, objects: CellPaths) {
 fn cell_found(model: &mut Model, workers: &Workers, desk: &SessionThreads, facts: CellFacts) {
     let doubted = model.cell.as_ref().and_then(|before| before.arm_doubt);
     match facts.arm_doubt {
-        Some(ArmDoubt::Foreign { distance_m, angle_rad }) => model.say(
+        Some(ArmDoubt::Foreign { distance_m, angle_rad }) => model.notify(
             Severity::Warning,
             text!(
                 "By its joints the tip of the robot is {distance} mm and {angle}° from where its driver reports it, so its chain of joints is not used. Check arm and base_from_arm of the driver and the tool that is set on the controller, and connect again",
@@ -153,7 +153,7 @@ fn cell_found(model: &mut Model, workers: &Workers, desk: &SessionThreads, facts
                 angle = format!("{:.2}", angle_rad.to_degrees())
             ),
         ),
-        None if doubted.is_some() && facts.arm.is_some() => model.say(
+        None if doubted.is_some() && facts.arm.is_some() => model.notify(
             Severity::Info,
             text!("Joints and poses of the robot agree: Calibrate for me can move it, once it is allowed to"),
         ),
@@ -194,7 +194,7 @@ fn link_changed(cx: &mut Context, link: Link, state: LinkState) {
                 }
                 Link::Motion => return,
             };
-            cx.model.say(Severity::Info, text);
+            cx.model.notify(Severity::Info, text);
         }
         (LinkState::Lost { why, .. }, true) => {
             let text = match link {
@@ -203,13 +203,13 @@ fn link_changed(cx: &mut Context, link: Link, state: LinkState) {
                 // Images and joints go on, so no card below the steps reports it.
                 Link::Motion => {
                     let reported = text!("Connection for motions lost: {why}", why = why);
-                    return cx.model.say(Severity::Warning, reported);
+                    return cx.model.notify(Severity::Warning, reported);
                 }
             };
-            cx.model.say_of_connection(Severity::Warning, text);
+            cx.model.notify_connection(Severity::Warning, text);
         }
         (LinkState::Failed { why }, _) if link != Link::Motion => {
-            cx.model.say_of_connection(Severity::Error, why);
+            cx.model.notify_connection(Severity::Error, why);
         }
         _ => {}
     }
@@ -218,13 +218,13 @@ fn link_changed(cx: &mut Context, link: Link, state: LinkState) {
 /// Lets a robot behind a driver be moved, or no longer.
 fn arm(model: &mut Model, workers: &Workers, on: bool) {
     let asked = workers.ask_control(Request::Do(ControlTask::Arm(on)));
-    model.say_if_refused(text!("The permission to move the robot was not changed"), asked);
+    model.notify_if_refused(text!("The permission to move the robot was not changed"), asked);
 }
 
 /// Takes the pose that the pendant shows; `None` once the robot is moved on.
 fn type_pose(model: &mut Model, workers: &Workers, pose: Option<Pose<Base, Tip>>) {
     let asked = workers.ask_control(Request::Do(ControlTask::TypePose(pose)));
-    model.say_if_refused(text!("The pose was not taken"), asked);
+    model.notify_if_refused(text!("The pose was not taken"), asked);
 }
 
 /// A pose that was typed is that of one capture: the next one is from another place, and the old pose would be wrong.
@@ -237,7 +237,7 @@ pub(crate) fn forget_typed_pose(model: &mut Model, workers: &Workers) {
 /// A driver said something for people.
 fn heard(model: &mut Model, severity: Severity, words: String) {
     let home = if severity == Severity::Error { Home::Toast } else { Home::Log };
-    model.messages.say_at(home, severity, Text::verbatim(words), model.now_s);
+    model.messages.notify_at(home, severity, Text::verbatim(words), model.now_s);
 }
 
 /// Has a worker of the camera do something.
@@ -249,7 +249,7 @@ pub(crate) fn ask_camera(
 ) -> bool {
     let asked = workers.ask_camera(Request::Do(task));
     let taken = asked.is_ok();
-    model.say_if_refused(failure, asked);
+    model.notify_if_refused(failure, asked);
     taken
 }
 

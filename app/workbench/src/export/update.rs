@@ -46,25 +46,25 @@ pub(crate) fn preview_exports(model: &mut Model, desk: &SessionThreads) {
     model.export.previews.clear();
     if let Some(job) = export_job(model) {
         let asked = desk.files(FileTask::Preview(job));
-        model.say_if_refused(text!("The exports are not shown"), asked);
+        model.notify_if_refused(text!("The exports are not shown"), asked);
     }
 }
 
 fn export(model: &mut Model, desk: &SessionThreads) {
     let Some(job) = export_job(model) else {
-        model.say(Severity::Warning, text!("There is nothing to export yet: solve first"));
+        model.notify(Severity::Warning, text!("There is nothing to export yet: solve first"));
         return;
     };
     let state = &model.export;
     let formats: Vec<String> = state.chosen.iter().cloned().collect();
     let folder = state.folder.clone().or_else(|| model.session.folder.as_deref().map(exports_of));
     let Some(folder) = folder.filter(|_| !formats.is_empty()) else {
-        model.say(Severity::Warning, text!("Choose at least one format, and a folder"));
+        model.notify(Severity::Warning, text!("Choose at least one format, and a folder"));
         return;
     };
     let asked = desk.files(FileTask::Export { job, formats, folder });
     model.export.writing = asked.is_ok();
-    model.say_if_refused(text!("Nothing was exported"), asked);
+    model.notify_if_refused(text!("Nothing was exported"), asked);
 }
 
 fn written(model: &mut Model, written: Written) {
@@ -74,11 +74,11 @@ fn written(model: &mut Model, written: Written) {
             model.export.is_present = true;
             let count = files.len();
             let reported = text!("{count} {count|file|files} written, read back and compared", count = count);
-            model.in_language_of(Pane::Export, Severity::Info, reported);
+            model.notify_in(Pane::Export, Severity::Info, reported);
         }
         Err(why) => {
             let reported = text!("Nothing was exported: {why}", why = why);
-            model.in_language_of(Pane::Export, Severity::Error, reported);
+            model.notify_in(Pane::Export, Severity::Error, reported);
         }
     }
     model.export.written = Some(written);
@@ -87,7 +87,7 @@ fn written(model: &mut Model, written: Written) {
 fn set_export_names(model: &mut Model, desk: &SessionThreads, names: ExportNames) {
     match serde_json::to_value(&names) {
         Ok(value) => edit(model, desk, Edit::SetExportNames(value)),
-        Err(error) => model.say(Severity::Error, text!("The names cannot be kept: {why}", why = error.to_string())),
+        Err(error) => model.notify(Severity::Error, text!("The names cannot be kept: {why}", why = error.to_string())),
     }
     model.export.names = names;
     preview_exports(model, desk);

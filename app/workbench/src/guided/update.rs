@@ -214,7 +214,7 @@ fn guided_is_elsewhere(model: &mut Model) -> bool {
     guided.waits = Waits::Answer;
     let reported =
         text!("The arm is elsewhere than when this pose was chosen: another one is chosen from where it is now");
-    model.say(Severity::Info, reported);
+    model.notify(Severity::Info, reported);
     true
 }
 
@@ -347,8 +347,8 @@ fn guided_ends(model: &mut Model, desk: &SessionThreads, severity: Severity, why
     model.sequence_runs = false;
     model.asked = None;
     match severity {
-        Severity::Info => model.say(severity, why),
-        _ => model.in_language_of(Pane::Poses, severity, why),
+        Severity::Info => model.notify(severity, why),
+        _ => model.notify_in(Pane::Poses, severity, why),
     }
 }
 

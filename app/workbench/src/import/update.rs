@@ -219,7 +219,7 @@ fn recording_converted(model: &mut Model, desk: &SessionThreads, number: u64, co
             model.opening = true;
             if desk.archive(ArchiveTask::Import(converted)).is_err() {
                 model.opening = false;
-                model.say(
+                model.notify(
                     Severity::Error,
                     text!("The disk does not keep up: nothing was changed. Try again in a moment"),
                 );

@@ -117,7 +117,7 @@ pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
 /// What was found, and why no more was.
 type Answer = (Option<Found>, Option<Text>);
 
-fn reported(error: NotUnderstood) -> Text {
+fn error_text(error: NotUnderstood) -> Text {
     match error {
         NotUnderstood::Target(why) => why,
         NotUnderstood::Import(ImportError::Stopped { why: Spent::Time(time), .. }) => text!(
@@ -144,7 +144,7 @@ fn look(
 ) -> Answer {
     let opened = match known.map(|known| Arc::clone(&known.opened)).map_or_else(open, Ok) {
         Ok(opened) => opened,
-        Err(error) => return (None, Some(reported(error.into()))),
+        Err(error) => return (None, Some(error_text(error.into()))),
     };
     let progress = |done, of| outlet.report(Event::Progress { number, work: ImportWork::Looking(done, of) });
     let looked = understand::look(&opened, target, settings, &progress, cancel);
@@ -161,7 +161,7 @@ fn look(
         found.judgement = Some(judgement?);
         Ok(())
     });
-    (Some(found), outcome.err().map(reported))
+    (Some(found), outcome.err().map(error_text))
 }
 
 fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
@@ -171,7 +171,7 @@ fn judged(known: &Found, settings: &Settings, cancel: &CancelToken) -> Answer {
     let judgement = looked.as_ref().map(|looked| looked.judge(settings, cancel)).transpose();
     let (judgement, trouble) = match judgement {
         Ok(judgement) => (judgement, None),
-        Err(error) => (None, Some(reported(error))),
+        Err(error) => (None, Some(error_text(error))),
     };
     let (given, settings) = (*given, settings.clone());
     (Some(Found { opened, recording, looked, given, settings, judgement, previews }), trouble)

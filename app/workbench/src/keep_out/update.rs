@@ -82,7 +82,7 @@ fn surroundings_found(model: &mut Model, scene_obstacles: Result<Arc<Surrounding
             let is_news = keep_out.unkept.as_ref() != Some(&reported) && !keep_out.content.boxes.is_empty();
             keep_out.unkept = Some(reported.clone());
             if is_news {
-                model.say(Severity::Warning, reported);
+                model.notify(Severity::Warning, reported);
             }
         }
     }
@@ -90,20 +90,20 @@ fn surroundings_found(model: &mut Model, scene_obstacles: Result<Arc<Surrounding
 
 fn import_keep_out(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
     let asked = desk.files(FileTask::ReadKeepOut(file));
-    model.say_if_refused(text!("The boxes were not read"), asked);
+    model.notify_if_refused(text!("The boxes were not read"), asked);
 }
 
 /// The boxes of a file come in place of those that there are.
 fn keep_out_read(model: &mut Model, workers: &Workers, content: KeepOutFile) {
     let count = content.boxes.len();
     set_keep_out(model, workers, content);
-    model.say(Severity::Info, text!("The arm keeps out of {count} {count|box|boxes} of the file", count = count));
+    model.notify(Severity::Info, text!("The arm keeps out of {count} {count|box|boxes} of the file", count = count));
 }
 
 fn export_keep_out(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
     let text = model.keep_out.content.to_toml();
     let asked = desk.files(FileTask::WriteKeepOut { file, text, is_wished: true });
-    model.say_if_refused(text!("The boxes were not written"), asked);
+    model.notify_if_refused(text!("The boxes were not written"), asked);
 }
 
 /// Keeps them in their file once nobody is changing them any longer, or at once.
@@ -117,7 +117,7 @@ pub(crate) fn keep_keep_out(model: &mut Model, desk: &SessionThreads, at_once: b
     let Some(file) = keep_out.file.clone() else { return };
     let text = keep_out.content.to_toml();
     let asked = desk.files(FileTask::WriteKeepOut { file, text, is_wished: false });
-    model.say_if_refused(text!("The boxes were not written"), asked);
+    model.notify_if_refused(text!("The boxes were not written"), asked);
 }
 
 /// Writes them, as a whole or not at all.

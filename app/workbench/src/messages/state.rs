@@ -78,12 +78,12 @@ pub struct Messages {
 impl Messages {
     /// Says something where messages of its kind stand. The same words twice in a row are one message that was reported
     /// twice.
-    pub fn say(&mut self, severity: Severity, text: Text, at_s: f64) {
-        self.say_at(Home::of(severity), severity, text, at_s);
+    pub fn notify(&mut self, severity: Severity, text: Text, at_s: f64) {
+        self.notify_at(Home::of(severity), severity, text, at_s);
     }
 
     /// The same in a place of its own.
-    pub fn say_at(&mut self, home: Home, severity: Severity, text: Text, at_s: f64) {
+    pub fn notify_at(&mut self, home: Home, severity: Severity, text: Text, at_s: f64) {
         let text = shortened(text);
         if let Some(last) = self.kept.back_mut().filter(|last| last.severity == severity && last.text == text) {
             last.times += 1;
@@ -150,21 +150,21 @@ mod tests {
     #[test]
     fn the_same_words_in_a_row_are_one_message_and_come_back_when_said_again() {
         let mut messages = Messages::default();
-        messages.say(Severity::Error, Text::verbatim("no"), 1.0);
+        messages.notify(Severity::Error, Text::verbatim("no"), 1.0);
         messages.dismiss(0);
-        messages.say(Severity::Error, Text::verbatim("no"), 2.0);
+        messages.notify(Severity::Error, Text::verbatim("no"), 2.0);
         let newest = messages.newest().expect("one");
         assert_eq!((newest.times, newest.at_s, newest.dismissed), (2, 2.0, false));
-        messages.say(Severity::Warning, Text::verbatim("no"), 3.0);
+        messages.notify(Severity::Warning, Text::verbatim("no"), 3.0);
         assert_eq!(messages.iter().len(), 2);
     }
 
     #[test]
     fn a_pane_says_its_last_warning_until_it_is_over() {
         let mut messages = Messages::default();
-        messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, Text::verbatim("no way"), 1.0);
-        messages.say(Severity::Error, Text::verbatim("elsewhere"), 2.0);
-        messages.say(Severity::Info, Text::verbatim("done"), 3.0);
+        messages.notify_at(Home::Pane(Pane::Jog), Severity::Warning, Text::verbatim("no way"), 1.0);
+        messages.notify(Severity::Error, Text::verbatim("elsewhere"), 2.0);
+        messages.notify(Severity::Info, Text::verbatim("done"), 3.0);
         let reported = |message: Option<&Message>| message.map(|message| message.number);
         assert_eq!(reported(messages.standing_in(Pane::Jog)), Some(0));
         assert_eq!(reported(messages.standing_in(Pane::Track)), None);
@@ -177,7 +177,7 @@ mod tests {
     fn old_messages_make_room() {
         let mut messages = Messages::default();
         for count in 0..KEPT + 5 {
-            messages.say(Severity::Info, Text::verbatim(format!("message {count}")), 0.0);
+            messages.notify(Severity::Info, Text::verbatim(format!("message {count}")), 0.0);
         }
         assert_eq!(messages.iter().len(), KEPT);
         assert_eq!(messages.iter().next().map(|message| message.number), Some(5));

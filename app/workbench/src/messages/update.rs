@@ -15,30 +15,30 @@ pub(crate) fn apply(model: &mut Model, command: Command) {
 /// Takes in what there is to tell.
 pub(crate) fn absorb(model: &mut Model, event: Event) {
     let Event::Notice { severity, text } = event;
-    model.say(severity, text);
+    model.notify(severity, text);
 }
 
 impl Model {
     /// Shows what a pane says for as long as it is so, and keeps it.
-    pub(crate) fn in_language_of(&mut self, pane: Pane, severity: Severity, text: Text) {
-        self.messages.say_at(Home::Pane(pane), severity, text, self.now_s);
+    pub(crate) fn notify_in(&mut self, pane: Pane, severity: Severity, text: Text) {
+        self.messages.notify_at(Home::Pane(pane), severity, text, self.now_s);
     }
 
     /// Keeps what the card below the steps says of the connection.
-    pub(crate) fn say_of_connection(&mut self, severity: Severity, text: Text) {
-        self.messages.say_at(Home::Connection, severity, text, self.now_s);
+    pub(crate) fn notify_connection(&mut self, severity: Severity, text: Text) {
+        self.messages.notify_at(Home::Connection, severity, text, self.now_s);
     }
 
     /// Shows a message and keeps it.
-    pub(crate) fn say(&mut self, severity: Severity, text: Text) {
-        self.messages.say(severity, text, self.now_s);
+    pub(crate) fn notify(&mut self, severity: Severity, text: Text) {
+        self.messages.notify(severity, text, self.now_s);
     }
 
     /// Tells the user when a worker did not take a request.
-    pub(crate) fn say_if_refused<Refused>(&mut self, failure: Text, asked: Result<(), Refused>) {
+    pub(crate) fn notify_if_refused<Refused>(&mut self, failure: Text, asked: Result<(), Refused>) {
         if let Err(_refused) = asked {
             let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);
-            self.say(Severity::Warning, text);
+            self.notify(Severity::Warning, text);
         }
     }
 }

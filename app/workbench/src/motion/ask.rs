@@ -22,7 +22,7 @@ pub(crate) fn set_out(cx: &mut Context, goal: MotionGoal, what: Text) {
 /// Whether somebody may send the arm somewhere now; a sequence would take the end of that motion for that of its own.
 pub(crate) fn may_set_out(model: &mut Model) -> bool {
     if model.sequence_runs {
-        model.in_language_of(
+        model.notify_in(
             Pane::Jog,
             Severity::Warning,
             text!("A sequence is under way: stop it to move the arm yourself"),
@@ -62,7 +62,7 @@ pub(crate) fn set_confirm_moves(cx: &mut Context, confirm: bool) {
 /// To where the arm stood when the cell was connected.
 pub(crate) fn go_home(cx: &mut Context) {
     let Some(home) = cx.model.home else {
-        return cx.model.say(Severity::Warning, text!("The position of the arm is not known: connect first"));
+        return cx.model.notify(Severity::Warning, text!("The position of the arm is not known: connect first"));
     };
     if may_set_out(&mut cx.model) {
         set_out(cx, MotionGoal::Joints(home), text!("home"));

@@ -70,7 +70,7 @@ pub(crate) fn stop_waits(model: &mut Model) {
 fn stop_is_over(model: &mut Model, severity: Severity, reported: Text) {
     model.stopping = None;
     model.stop_pending = false;
-    model.say(severity, reported);
+    model.notify(severity, reported);
 }
 
 pub(crate) fn stop(model: &mut Model, workers: &Workers) {
@@ -86,9 +86,9 @@ pub(crate) fn stop_requested(model: &mut Model, workers: &Workers) {
     // It may be done already: only its report is not here yet.
     model.stop_pending = workers.stop_line().is_pressed();
     if model.control.is_connected() {
-        model.say(Severity::Info, text!("Stopping the arm…"));
+        model.notify(Severity::Info, text!("Stopping the arm…"));
     } else {
-        model.say(
+        model.notify(
             Severity::Error,
             text!(
                 "The arm cannot be reached: use its own emergency stop. It is stopped as soon as the connection is \

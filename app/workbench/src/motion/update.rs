@@ -70,7 +70,7 @@ fn go_to_capture(cx: &mut Context, id: CaptureId) {
     let goal = joints.map(MotionGoal::Joints).or(capture.base_from_tip.map(MotionGoal::Tip));
     let Some(goal) = goal else {
         let why = text!("Capture {id} has no pose of the robot", id = id);
-        return cx.model.in_language_of(Pane::Jog, Severity::Warning, why);
+        return cx.model.notify_in(Pane::Jog, Severity::Warning, why);
     };
     set_out(cx, goal, text!("pose of capture {id}", id = id));
 }
@@ -93,16 +93,16 @@ pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
     match &outcome {
         MotionOutcome::Arrived => {}
         MotionOutcome::Stopped => {
-            cx.model.in_language_of(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
+            cx.model.notify_in(Pane::Jog, Severity::Warning, text!("Stopped on the way to {what}", what = what));
         }
         MotionOutcome::Refused(why) => {
             let why = why.clone();
             let reported = text!("The arm does not move to {what}: {why}", what = what, why = why);
-            cx.model.in_language_of(Pane::Jog, Severity::Warning, reported);
+            cx.model.notify_in(Pane::Jog, Severity::Warning, reported);
         }
         MotionOutcome::Unreached(why) | MotionOutcome::Failed(why) | MotionOutcome::Held(why) => {
             let reported = text!("The arm did not get to {what}: {why}", what = what, why = why.clone());
-            cx.model.in_language_of(Pane::Jog, Severity::Error, reported);
+            cx.model.notify_in(Pane::Jog, Severity::Error, reported);
         }
     }
     // What an earlier motion still has to say does not move a sequence on.
@@ -129,7 +129,7 @@ fn press_jog(model: &mut Model, workers: &Workers, numbers: &mut Numbers, jog: J
                     let (what, since_s) = (text!("the next step"), model.now_s);
                     model.motion = Motion::Moving { id, what, since_s };
                 }
-                Err(busy) => model.in_language_of(Pane::Jog, Severity::Warning, busy.into()),
+                Err(busy) => model.notify_in(Pane::Jog, Severity::Warning, busy.into()),
             }
         }
     }
@@ -148,7 +148,7 @@ fn jog_ended(model: &mut Model, why: Option<Text>) {
         model.motion = Motion::Idle;
     }
     if let Some(why) = why {
-        model.in_language_of(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
+        model.notify_in(Pane::Jog, Severity::Warning, text!("Jogging has ended: {why}", why = why));
     }
 }
 

@@ -89,7 +89,7 @@ pub(crate) fn prepare_session(model: &mut Model, desk: &SessionThreads) {
 fn ask_archive(model: &mut Model, desk: &SessionThreads, task: ArchiveTask) {
     let asked = desk.archive(task);
     if asked.is_err() {
-        model.say(Severity::Error, text!("The disk does not keep up: nothing was changed. Try again in a moment"));
+        model.notify(Severity::Error, text!("The disk does not keep up: nothing was changed. Try again in a moment"));
     }
 }
 
@@ -160,13 +160,13 @@ fn save_as(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
 
 pub(crate) fn list_folder(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
     let asked = desk.files(FileTask::List(folder));
-    model.say_if_refused(text!("The folder was not read"), asked);
+    model.notify_if_refused(text!("The folder was not read"), asked);
 }
 
 /// Shows a folder in the program of the system for that.
 fn open_folder(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
     let asked = desk.files(FileTask::OpenFolder(folder));
-    model.say_if_refused(text!("The folder was not opened"), asked);
+    model.notify_if_refused(text!("The folder was not opened"), asked);
 }
 
 /// The document is now like this, on the disk.
@@ -231,13 +231,13 @@ fn session_opened(model: &mut Model, desk: &SessionThreads, exported: bool) {
         set_dialog(model, desk, None);
     }
     if let Some(folder) = model.session.folder.clone() {
-        model.say(Severity::Info, text!("Session {folder} is open", folder = folder.display()));
+        model.notify(Severity::Info, text!("Session {folder} is open", folder = folder.display()));
     }
 }
 
 fn session_failed(model: &mut Model, why: Text) {
     model.opening = false;
-    model.say(Severity::Error, why);
+    model.notify(Severity::Error, why);
 }
 
 /// Has the captures looked at that nobody has looked at for the present target.
@@ -279,7 +279,7 @@ fn select(model: &mut Model, desk: &SessionThreads, ids: Vec<CaptureId>) {
     let capture = model.document().capture(id).cloned();
     let (Some(folder), Some(capture)) = (model.session.folder.clone(), capture) else { return };
     let asked = desk.files(FileTask::Review { folder, capture: Box::new(capture), colours: model.view.depth_colours });
-    model.say_if_refused(text!("The capture is not shown"), asked);
+    model.notify_if_refused(text!("The capture is not shown"), asked);
 }
 
 fn reviewed(model: &mut Model, id: CaptureId, images: Option<Arc<FrameImages>>) {
@@ -292,12 +292,12 @@ fn reviewed(model: &mut Model, id: CaptureId, images: Option<Arc<FrameImages>>) 
 pub(crate) fn send_target(model: &mut Model, workers: &Workers) {
     let target = model.document().meta.target;
     let asked = workers.ask_vision(VisionTask::SetTarget(target));
-    model.say_if_refused(text!("The target was not changed"), asked);
+    model.notify_if_refused(text!("The target was not changed"), asked);
 }
 
 /// Tells them what the camera is.
 pub(crate) fn send_intrinsics(model: &mut Model, workers: &Workers) {
     let Some(intrinsics) = model.intrinsics() else { return };
     let asked = workers.ask_vision(VisionTask::SetIntrinsics(intrinsics));
-    model.say_if_refused(text!("The camera was not changed"), asked);
+    model.notify_if_refused(text!("The camera was not changed"), asked);
 }

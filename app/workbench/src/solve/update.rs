@@ -228,7 +228,7 @@ fn solve_ended(cx: &mut Context, job: JobId, outcome: SolveOutcome) {
             preview_exports(&mut cx.model, &cx.desk);
             let Some(folder) = cx.model.session.folder.clone() else { return };
             if cx.desk.archive(ArchiveTask::Result { folder, result }).is_err() {
-                cx.model.say(
+                cx.model.notify(
                     Severity::Warning,
                     text!("The result was not kept beside the session; solve again to keep it"),
                 );

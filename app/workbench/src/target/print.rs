@@ -50,5 +50,5 @@ pub(crate) fn print_target(model: &mut Model, desk: &SessionThreads, page: Page)
     let folder: &PathBuf = model.session.folder.as_ref().unwrap_or(&model.sessions);
     let file = folder.join(file_name(&target));
     let asked = desk.files(FileTask::PrintTarget { target, page, file });
-    model.say_if_refused(text!("The board was not written"), asked);
+    model.notify_if_refused(text!("The board was not written"), asked);
 }

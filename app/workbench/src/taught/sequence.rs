@@ -28,7 +28,7 @@ const VIEWS_SEED: u64 = 1;
 pub(crate) fn run_sequence(cx: &mut Context, purpose: Option<CapturePurpose>) {
     let names: Vec<String> = cx.model.taught().iter().map(|pose| pose.name.clone()).collect();
     if names.is_empty() {
-        cx.model.say(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
+        cx.model.notify(Severity::Warning, text!("There are no taught poses: teach some, or take the reference poses"));
         return;
     }
     if purpose.is_some() && refuses_without_robot(&mut cx.model) {
@@ -53,7 +53,7 @@ pub(crate) fn begin_sequence(cx: &mut Context, sequence: PoseSequence) {
 pub(crate) fn continue_sequence(cx: &mut Context) {
     if cx.model.capture.is_some() {
         // It would be taken for that of the pose.
-        return cx.model.say(Severity::Warning, text!("A capture is under way: wait until it is kept"));
+        return cx.model.notify(Severity::Warning, text!("A capture is under way: wait until it is kept"));
     }
     if continue_guided(cx) {
         return;
@@ -82,7 +82,7 @@ pub(crate) fn plan_verification(model: &mut Model, workers: &Workers, numbers: &
     });
     let Some(board) = board else {
         let why = text!("Poses to verify at are planned with a calibration of a camera on the tip only");
-        return model.in_language_of(Pane::Verify, Severity::Warning, why);
+        return model.notify_in(Pane::Verify, Severity::Warning, why);
     };
     let taken = model.document().captures.iter().filter(|it| !it.excluded).filter_map(|it| it.base_from_tip).collect();
     numbers.motion = MotionId(numbers.motion.0 + 1);
@@ -91,7 +91,7 @@ pub(crate) fn plan_verification(model: &mut Model, workers: &Workers, numbers: &
     let asked = workers.plan_views(numbers.motion, request);
     model.planning = asked.is_ok();
     numbers.plan = asked.is_ok().then_some(numbers.motion);
-    model.say_if_refused(text!("No poses are planned"), asked);
+    model.notify_if_refused(text!("No poses are planned"), asked);
 }
 
 /// The poses are planned, or cannot be.
@@ -115,7 +115,7 @@ pub(crate) fn planned(cx: &mut Context, id: MotionId, views: Result<Vec<JointVal
         ),
         Err(why) => {
             let reported = text!("There are no poses to verify at: {why}", why = why);
-            cx.model.in_language_of(Pane::Verify, Severity::Warning, reported);
+            cx.model.notify_in(Pane::Verify, Severity::Warning, reported);
         }
     }
 }
@@ -125,7 +125,7 @@ pub(crate) fn plan_refused(model: &mut Model, outcome: &MotionOutcome) {
     model.planning = false;
     if let Some(why) = outcome.why() {
         let reported = text!("There are no poses to verify at: {why}", why = why.clone());
-        model.in_language_of(Pane::Verify, Severity::Warning, reported);
+        model.notify_in(Pane::Verify, Severity::Warning, reported);
     }
 }
 
@@ -161,8 +161,8 @@ pub(crate) fn next_stop(cx: &mut Context) {
     let reported =
         text!("Sequence ended: {done} of {of} {of|pose|poses} in {took} s", done = done, of = of, took = took);
     match severity {
-        Severity::Info => cx.model.say(severity, reported),
-        _ => cx.model.in_language_of(pane, severity, reported),
+        Severity::Info => cx.model.notify(severity, reported),
+        _ => cx.model.notify_in(pane, severity, reported),
     }
 }
 
@@ -231,7 +231,7 @@ pub(crate) fn break_off(model: &mut Model, why: Option<Text>) {
         Some(why) => text!("The sequence was broken off, and what was captured is kept: {why}", why = why),
         None => text!("The sequence was broken off; what was captured is kept"),
     };
-    model.in_language_of(pane, Severity::Warning, reported);
+    model.notify_in(pane, Severity::Warning, reported);
 }
 
 /// Where it says how it went.

@@ -59,7 +59,7 @@ pub(crate) fn absorb(cx: &mut Context, event: Event) {
 /// These are the poses of this cell now; those of others stay.
 fn edit_taught(model: &mut Model, desk: &SessionThreads, change: TaughtChange, poses: Vec<TaughtPose>) {
     let Some(cell) = model.taught_on(model.document().meta.target) else {
-        return model.say(Severity::Warning, text!("Taught poses belong to an arm: connect it first"));
+        return model.notify(Severity::Warning, text!("Taught poses belong to an arm: connect it first"));
     };
     let mut all = model.document().taught.clone();
     all.retain(|pose| !pose.is_of(Some(&cell)));
@@ -74,7 +74,7 @@ fn taught(model: &Model) -> Vec<TaughtPose> {
 /// Joints are remembered and not the tip, because they bring the arm back on the same way.
 fn teach(model: &mut Model, desk: &SessionThreads, name: Option<String>) {
     let Some(robot) = &model.robot else {
-        model.say(Severity::Warning, text!("The position of the arm is not known: connect first"));
+        model.notify(Severity::Warning, text!("The position of the arm is not known: connect first"));
         return;
     };
     let goal = Goal::Joints(robot.joints_rad.to_vec());
@@ -129,7 +129,7 @@ fn adopt_taught(model: &mut Model, desk: &SessionThreads) {
     let (adopted, others) = (fit.into_iter().cloned().collect::<Vec<_>>(), others.len());
     if others > 0 {
         let reported = text!("{n} {n|pose has|poses have} another number of joints than this arm", n = others);
-        model.say(Severity::Warning, reported);
+        model.notify(Severity::Warning, reported);
     }
     if adopted.is_empty() {
         return;
@@ -145,7 +145,7 @@ fn adopt_taught(model: &mut Model, desk: &SessionThreads) {
 
 fn import_taught(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
     let asked = desk.files(FileTask::ReadPoses(file));
-    model.say_if_refused(text!("The poses were not read"), asked);
+    model.notify_if_refused(text!("The poses were not read"), asked);
 }
 
 fn poses_read(model: &mut Model, desk: &SessionThreads, read: Vec<TaughtPose>) {
@@ -164,7 +164,7 @@ fn export_taught(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
     let is_prismatic = |joint: &usize| model.joint_kind(*joint) == JointKind::Prismatic;
     let prismatic = (0..joints.unwrap_or(0)).filter(is_prismatic).collect();
     let asked = desk.files(FileTask::WritePoses { file, poses, prismatic });
-    model.say_if_refused(text!("The poses were not written"), asked);
+    model.notify_if_refused(text!("The poses were not written"), asked);
 }
 
 fn visit_taught(cx: &mut Context, name: &str) {

@@ -38,7 +38,7 @@ pub(crate) fn absorb(model: &mut Model, workers: &Workers, numbers: &mut Numbers
 
 pub(crate) fn set_tracking(model: &mut Model, workers: &Workers, numbers: &mut Numbers, on: bool) {
     if on && model.calibrated().is_none() {
-        model.say(Severity::Warning, text!("Tracking needs a calibration: capture poses and solve first"));
+        model.notify(Severity::Warning, text!("Tracking needs a calibration: capture poses and solve first"));
         return;
     }
     let before = std::mem::replace(&mut model.track.on, on);
@@ -62,7 +62,7 @@ pub(crate) fn send_tracking(model: &mut Model, workers: &Workers) {
         })
     });
     let asked = workers.ask_vision(VisionTask::Track(setup));
-    model.say_if_refused(text!("Tracking was not changed"), asked);
+    model.notify_if_refused(text!("Tracking was not changed"), asked);
 }
 
 fn tracked(model: &mut Model, tracked: Arc<Tracked>) {
@@ -90,7 +90,7 @@ fn tracked(model: &mut Model, tracked: Arc<Tracked>) {
 }
 
 fn track_failed(model: &mut Model, workers: &Workers, numbers: &mut Numbers, why: Text) {
-    model.say(Severity::Error, text!("The board is not tracked: {why}", why = why));
+    model.notify(Severity::Error, text!("The board is not tracked: {why}", why = why));
     set_tracking(model, workers, numbers, false);
 }
 
@@ -114,7 +114,7 @@ fn set_follow(model: &mut Model, workers: &Workers, numbers: &mut Numbers, reque
             model.track.follow = FollowStatus::Off;
             let what = text!("the board");
             model.motion = Motion::Moving { id, what, since_s: model.now_s };
-            model.say(Severity::Info, text!("The arm follows the board"));
+            model.notify(Severity::Info, text!("The arm follows the board"));
         }
         Err(busy) => follow_ended(model, numbers, MotionOutcome::Refused(busy.into())),
     }
@@ -139,8 +139,8 @@ pub(crate) fn follow_ended(model: &mut Model, numbers: &mut Numbers, outcome: Mo
     };
     let reported = text!("The arm does not follow the board: {why}", why = why.clone());
     match severity {
-        Severity::Info => model.say(severity, reported),
-        _ => model.in_language_of(Pane::Track, severity, reported),
+        Severity::Info => model.notify(severity, reported),
+        _ => model.notify_in(Pane::Track, severity, reported),
     }
     model.track.follow = FollowStatus::Ended(why);
 }
@@ -150,7 +150,7 @@ fn move_board(model: &mut Model, workers: &Workers, motion: BoardMotion) {
     if asked.is_ok() {
         model.track.board = motion;
     }
-    model.say_if_refused(text!("The board was not moved"), asked);
+    model.notify_if_refused(text!("The board was not moved"), asked);
 }
 
 fn hide_board(model: &mut Model, workers: &Workers, hidden: bool) {
@@ -158,5 +158,5 @@ fn hide_board(model: &mut Model, workers: &Workers, hidden: bool) {
     if asked.is_ok() {
         model.track.board_hidden = hidden;
     }
-    model.say_if_refused(text!("The board was not hidden"), asked);
+    model.notify_if_refused(text!("The board was not hidden"), asked);
 }

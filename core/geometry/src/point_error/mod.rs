@@ -9,7 +9,7 @@ use crate::se3::skew;
 
 pub use radius::{radius_95, radius_95_mixture, radius_95_t};
 
-/// Covariance in the camera frame of where `point` (camera coordinates, metres) is reported to be, given the covariance
+/// Covariance in the camera frame of where `point` (camera coordinates, metres) is stated to be, given the covariance
 /// `[t; r]` of the hand-eye transform (right perturbation).
 pub fn covariance(hand_eye: &Matrix6<f64>, point: &Point3<f64>) -> Matrix3<f64> {
     let by_pose = by_hand_eye(point);

@@ -45,7 +45,7 @@ pub struct Charuco {
     pub marker_m: f64,
     /// Family of the markers.
     pub dictionary: Dictionary,
-    /// Which squares have the markers; told apart from each image where it is not reported.
+    /// Which squares have the markers; told apart from each image where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layout: Option<Layout>,
 }
@@ -157,7 +157,7 @@ pub struct AprilGrid {
     pub first_id: usize,
     /// Family of the tags.
     pub family: Dictionary,
-    /// Width of the black border in bits: 2 on Kalibr's boards, 1 elsewhere. Both are looked for where it is not reported.
+    /// Width of the black border in bits: 2 on Kalibr's boards, 1 elsewhere. Both are looked for where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border_bits: Option<usize>,
     /// Which tag is the first.
@@ -264,7 +264,7 @@ pub struct AprilTag {
     pub id: usize,
     /// Its family.
     pub family: Dictionary,
-    /// Width of the black border in bits, 1 where it is not reported.
+    /// Width of the black border in bits, 1 where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border_bits: Option<usize>,
 }

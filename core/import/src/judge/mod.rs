@@ -127,7 +127,8 @@ pub fn judge(
             chosen.push(it.index);
         }
     }
-    let mut hypotheses: Vec<Hypothesis> = chosen.iter().flat_map(|i| judge.judged(&cases[*i])).collect();
+    let mut hypotheses: Vec<Hypothesis> =
+        chosen.iter().take_while(|_| !cancel.is_cancelled()).flat_map(|i| judge.judged(&cases[*i])).collect();
     if hypotheses.iter().all(|h| h.fit.is_none()) && !cancel.is_cancelled() {
         if let Some(stood) = cases::did_not_move(recording, &paired, settings) {
             return Err(stood);

@@ -1,4 +1,4 @@
-//! Hypotheses that explain the images, but far better with a target of another size than was reported.
+//! Hypotheses that explain the images, but far better with a target of another size than was stated.
 
 use super::trial::Judge;
 use crate::hypothesis::{Hypothesis, Source};

@@ -69,14 +69,14 @@ pub struct CellSetup {
     /// Focal length \[px\] of a first view that is straight on, with the board close to the edge of the image; `None` for that
     /// of the other studies, and a first view that is tilted a little.
     pub straight: Option<f64>,
-    /// What is not as it is reported to be.
+    /// What is not as it is stated to be.
     pub untold: HiddenErrors,
     /// Seed of places and noise.
     pub seed: u64,
 }
 
 impl CellSetup {
-    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is reported to be.
+    /// A good robot and a good camera whose lens is known, a first view that is tilted a little, and all as it is stated to be.
     pub fn new(arm: CellArm, mode: Mode, seed: u64) -> Self {
         Self { arm, mode, noise: REALISTIC, free_lens: false, straight: None, untold: HiddenErrors::NOTHING, seed }
     }
@@ -87,12 +87,12 @@ impl CellSetup {
 pub struct HiddenErrors {
     /// Deflection of the middle of the board against its edges along x and along y, metres.
     pub bend_m: [f64; 2],
-    /// True focal length over that of the lens which is reported to be known.
+    /// True focal length over that of the lens which is stated to be known.
     pub focal: f64,
 }
 
 impl HiddenErrors {
-    /// All is as it is reported to be.
+    /// All is as it is stated to be.
     pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0 };
 }
 

@@ -13,10 +13,10 @@ use syn::{Attribute, Data, DeriveInput, Error, Fields, LitStr, Result, Type};
 #[proc_macro_derive(Localized)]
 pub fn derive_localized(input: proc_macro::TokenStream) -> proc_macro::TokenStream {
     let input = syn::parse_macro_input!(input as DeriveInput);
-    reported(&input).unwrap_or_else(|error| error.to_compile_error()).into()
+    localized(&input).unwrap_or_else(|error| error.to_compile_error()).into()
 }
 
-fn reported(input: &DeriveInput) -> Result<TokenStream> {
+fn localized(input: &DeriveInput) -> Result<TokenStream> {
     let name = &input.ident;
     let arms = match &input.data {
         Data::Enum(data) => {

@@ -237,25 +237,25 @@ impl FromDriver {
 }
 
 fn body<'a, T: Deserialize<'a>>(kind: &str, line: &'a str) -> Result<T, BadMessage> {
-    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: reported(&error) })
+    serde_json::from_str(line).map_err(|error| BadMessage::Field { kind: kind.to_owned(), why: error_text(&error) })
 }
 
 /// What the parser says, which may repeat what a driver has sent: on one line, and in its beginning.
-fn reported(error: &serde_json::Error) -> String {
+fn error_text(error: &serde_json::Error) -> String {
     let one_line = |c: char| if c.is_control() { ' ' } else { c };
     error.to_string().chars().map(one_line).take(LONGEST_MESSAGE).collect()
 }
 
 fn not_a_message(line: &str, error: &serde_json::Error) -> BadMessage {
     if error.is_data() {
-        BadMessage::Field { kind: "message".to_owned(), why: reported(error) }
+        BadMessage::Field { kind: "message".to_owned(), why: error_text(error) }
     } else if line.contains("NaN") || line.contains("Infinity") {
         // What Python writes for numbers that are none.
         BadMessage::NotJson {
-            why: format!("{}: JSON has no NaN and no Infinity, leave the field out", reported(error)),
+            why: format!("{}: JSON has no NaN and no Infinity, leave the field out", error_text(error)),
         }
     } else {
-        BadMessage::NotJson { why: reported(error) }
+        BadMessage::NotJson { why: error_text(error) }
     }
 }
 

@@ -197,7 +197,7 @@ impl MotionPort for RemoteMotion {
             Ok(Ok(JogEnd::OtherTip)) => Ok(Some(other_tip())),
             Ok(Err(why)) => Ok(Some(why)),
             Err(error) if is_lost(&error) => Err(port_error(error)),
-            Err(error) => Ok(Some(reported(&error))),
+            Err(error) => Ok(Some(error_text(&error))),
         }
     }
 
@@ -321,21 +321,21 @@ fn outcome_of(error: LinkError, cancel: &CancelToken) -> Result<MotionOutcome, P
         LinkError::MotionStopped { .. } => Ok(MotionOutcome::Stopped),
         LinkError::Cancelled { .. } if cancel.is_cancelled() => Ok(MotionOutcome::Stopped),
         error if is_lost(&error) => Err(port_error(error)),
-        error @ LinkError::Unreached { .. } => Ok(MotionOutcome::Unreached(reported(&error))),
-        error @ LinkError::Held { .. } => Ok(MotionOutcome::Held(reported(&error))),
+        error @ LinkError::Unreached { .. } => Ok(MotionOutcome::Unreached(error_text(&error))),
+        error @ LinkError::Held { .. } => Ok(MotionOutcome::Held(error_text(&error))),
         // These are found out before anything moves.
         error @ (LinkError::JointOutOfRange { .. }
         | LinkError::JointCount { .. }
         | LinkError::InTheWay { .. }
         | LinkError::BadMotion { .. }
         | LinkError::NoSuchObject { .. }
-        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(reported(&error))),
-        error => Ok(MotionOutcome::Failed(reported(&error))),
+        | LinkError::Unsupported { .. }) => Ok(MotionOutcome::Refused(error_text(&error))),
+        error => Ok(MotionOutcome::Failed(error_text(&error))),
     }
 }
 
 /// What a person does about it, in the language of the window; what is rare stays in the words of the client.
-fn reported(error: &LinkError) -> Text {
+fn error_text(error: &LinkError) -> Text {
     match error {
         LinkError::NotRunning { state: SimulationState::Paused, .. } => {
             text!("The simulation is paused: continue it first")

@@ -55,7 +55,7 @@ fn get_object_matrix(call: &mut Call<'_>) -> Outcome {
 /// What a setter is told: the object, what the value is relative to, and at which position the value is.
 ///
 /// The value comes second and the reference third, or, in the old order, the other way round.
-fn reported(call: &Call<'_>) -> Result<(Flagged, i64, usize), ApiError> {
+fn pose_arguments(call: &Call<'_>) -> Result<(Flagged, i64, usize), ApiError> {
     let object = Flagged::parse(call.args.handle(0)?);
     if call.args.is_table(1) {
         return Ok((object, call.args.integer_or(2, poses::HANDLE_WORLD)?, 1));
@@ -70,7 +70,7 @@ fn set(
     call: &mut Call<'_>,
     change: impl FnOnce(&Call<'_>, usize, Flagged, Isometry3<f64>) -> Result<Isometry3<f64>, ApiError>,
 ) -> Outcome {
-    let (object, relative_to, at) = reported(call)?;
+    let (object, relative_to, at) = pose_arguments(call)?;
     let present = poses::get(&call.cell.world.tree, object, relative_to)?;
     let pose = change(call, at, object, present)?;
     poses::set(&mut call.cell.world.tree, object, relative_to, &pose)?;

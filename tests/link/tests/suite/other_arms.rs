@@ -58,7 +58,7 @@ impl Bench {
         self.arm.move_to_joints(goal, &limits, &CancelToken::default()).expect("there");
     }
 
-    /// Where the tip is reported to be is where it is, after another motion of all joints than the one it was read at.
+    /// Where the tip is stated to be is where it is, after another motion of all joints than the one it was read at.
     pub fn assert_known(&mut self, kinematics: &ArmKinematics) {
         let now = self.arm.joint_values().expect("a call");
         let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };

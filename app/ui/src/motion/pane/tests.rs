@@ -378,7 +378,7 @@ fn what_the_arm_does_can_be_stopped_and_a_refusal_is_read() {
     let mut model = sample::connected();
     model.motion = Motion::Moving { id: MotionId(1), what: Text::verbatim("pose 3"), since_s: 96.0 };
     let why = Text::verbatim("Joint 2 would leave its range");
-    model.messages.say_at(Home::Pane(Pane::Jog), Severity::Warning, why, 99.0);
+    model.messages.notify_at(Home::Pane(Pane::Jog), Severity::Warning, why, 99.0);
     let mut pane = driven(model);
     assert!(pane.sees("Moving: pose 3 (4 s)"));
     assert_eq!(pane.click("Stop"), [Command::Motion(motion::Command::Stop)]);
@@ -400,7 +400,7 @@ fn what_moves_the_arm_keeps_its_place_whatever_is_said() {
     let long = "The arm does not move to the next pose: ".repeat(20);
     let says = |words: &str, severity| {
         let mut model = sample::connected();
-        model.messages.say_at(Home::Pane(Pane::Jog), severity, Text::verbatim(words), 99.0);
+        model.messages.notify_at(Home::Pane(Pane::Jog), severity, Text::verbatim(words), 99.0);
         model
     };
     let mut unknown_arm = sample::connected();

@@ -173,7 +173,7 @@ fn captures_at_planned_poses_show_how_far_they_are_and_are_stopped_from_the_pane
     assert_eq!(pane.click("Stop the sequence"), [Command::Taught(taught::Command::StopSequence)]);
     pane.model().sequence_runs = false;
     let why = Text::verbatim("it was broken off");
-    pane.model().messages.say_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);
+    pane.model().messages.notify_at(Home::Pane(Pane::Verify), Severity::Warning, why, 99.0);
     pane.steps();
     assert!(pane.sees("Last sequence: 1 of 3 done, 1 skipped, 1 not visited"));
     assert!(pane.sees("Skipped V2: the board was not found") && pane.sees("it was broken off"));

@@ -117,7 +117,7 @@ pub fn error_by_views<'a>(
     Ok(ErrorCurve { gathered, further })
 }
 
-/// The corners of the views linearised at a solution with the robot where it was reported to be.
+/// The corners of the views linearised at a solution with the robot where it was stated to be.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.

@@ -41,7 +41,7 @@ impl Frames {
         }
     }
 
-    /// Of every frame that is not reported to be static, its poses in its parent.
+    /// Of every frame that is not stated to be static, its poses in its parent.
     pub fn moving(&self) -> impl Iterator<Item = &Timed<Isometry3<f64>>> {
         self.0.values().filter(|frame| !frame.is_static).map(|frame| &frame.parent_from_frame)
     }
