@@ -34,7 +34,7 @@
 //!     web: WebViewer::AtAddress,
 //!     waker: Arc::new(|| {}),
 //! })?;
-//! recorder.note(Entry::Said { severity: Severity::Info, words: "ten poses".to_owned() });
+//! recorder.note(Entry::Message { severity: Severity::Info, words: "ten poses".to_owned() });
 //! assert!(recorder.finish(Duration::from_secs(20)), "written in time");
 //! assert!(std::fs::metadata(&file)?.len() > 0);
 //! # Ok::<(), std::io::Error>(())

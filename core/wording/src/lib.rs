@@ -14,7 +14,7 @@
 //! use handeye_wording::{English, text};
 //!
 //! let size = text!("{count} bytes", count = 12);
-//! assert_eq!(size.say(English), "12 bytes");
+//! assert_eq!(size.in_language(English), "12 bytes");
 //! ```
 //!
 //! Depends on `serde` and its own derive macro alone.
