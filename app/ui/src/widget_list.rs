@@ -3,10 +3,10 @@
 //! Only when `HANDEYE_WIDGETS` names the file. It is the tree that screen readers get, flattened.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use egui::{Context, FullOutput, RawInput};
-use handeye_files::atomic_file;
 
 /// The variable that names the file.
 pub const VARIABLE: &str = "HANDEYE_WIDGETS";
@@ -50,10 +50,17 @@ impl egui::Plugin for WidgetList {
             let _infallible = writeln!(list, "{line}");
         }
         if list != self.written {
-            if let Err(error) = atomic_file::write(&self.file, list.as_bytes()) {
+            if let Err(error) = replaced(&self.file, &list) {
                 tracing::warn!(%error, "the list of controls was not written");
             }
             self.written = list;
         }
     }
+}
+
+/// Replaces the file whole, and leaves to the system when it is on the disk: a frame does not wait for that.
+fn replaced(file: &Path, list: &str) -> io::Result<()> {
+    let partial = file.with_extension("partial");
+    fs::write(&partial, list)?;
+    fs::rename(&partial, file)
 }
