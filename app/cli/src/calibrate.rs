@@ -21,7 +21,6 @@ pub const EXAMPLES: &str = "Examples:
   handeye calibrate my_robot_images realistic --share-intrinsics --out results";
 
 /// Options of `handeye calibrate`.
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 #[derive(Debug, Args)]
 pub struct CalibrateArgs {
     /// Session or dataset folder: images, a pose table and dataset.toml. With `--share-intrinsics` two or more.
@@ -46,9 +45,6 @@ pub struct CalibrateArgs {
     /// Estimate the true size of the target, which the robot's translations tell.
     #[arg(long, help_heading = heading::ESTIMATE)]
     free_scale: bool,
-    /// Try constant offsets of the robot's joints, and take them when views held out say so. Needs joint angles.
-    #[arg(long, help_heading = heading::ESTIMATE)]
-    joint_offsets: bool,
     /// End with exit code 1 unless a number of the result is below a limit, such as `tip_error_95_mm<0.5`. A finding that
     /// is a problem ends with it too, whatever the numbers.
     #[arg(long, value_name = "NAME<LIMIT", help_heading = heading::OUTPUT)]
@@ -59,7 +55,7 @@ pub struct CalibrateArgs {
 
 impl CalibrateArgs {
     fn options(&self) -> Options {
-        Options { keep_outliers: self.keep_outliers, free_scale: self.free_scale, joint_offsets: self.joint_offsets }
+        Options { keep_outliers: self.keep_outliers, free_scale: self.free_scale }
     }
 }
 

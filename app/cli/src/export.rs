@@ -140,7 +140,7 @@ fn read_views(path: &Path) -> Result<Vec<ExportView>, Failure> {
 }
 
 /// The result of a session or dataset, or a result file itself.
-fn read_result(path: &Path) -> Result<CalibrationResult, Failure> {
+pub fn read_result(path: &Path) -> Result<CalibrationResult, Failure> {
     let file = if path.is_dir() {
         let found = [solve::RESULT_FILE, EXPORTED_RESULT].map(|name| path.join(name)).into_iter().find(|f| f.is_file());
         found.ok_or_else(|| {

@@ -20,13 +20,23 @@ enum Number {
     Sigma,
     HeldOut,
     TipError,
+    Reach,
+    ReachCorrected,
     RobotPosition,
     RobotOrientation,
 }
 
 impl Number {
-    const ALL: [Self; 6] =
-        [Self::Rms, Self::Sigma, Self::HeldOut, Self::TipError, Self::RobotPosition, Self::RobotOrientation];
+    const ALL: [Self; 8] = [
+        Self::Rms,
+        Self::Sigma,
+        Self::HeldOut,
+        Self::TipError,
+        Self::Reach,
+        Self::ReachCorrected,
+        Self::RobotPosition,
+        Self::RobotOrientation,
+    ];
 
     fn key(self) -> &'static str {
         match self {
@@ -34,6 +44,8 @@ impl Number {
             Self::Sigma => "sigma_px",
             Self::HeldOut => "heldout_rms_px",
             Self::TipError => "tip_error_95_mm",
+            Self::Reach => "reach_error_95_mm",
+            Self::ReachCorrected => "reach_error_corrected_95_mm",
             Self::RobotPosition => "robot_sigma_mm",
             Self::RobotOrientation => "robot_sigma_deg",
         }
@@ -45,6 +57,8 @@ impl Number {
             Self::Sigma => quality.sigma_px,
             Self::HeldOut => quality.heldout_rms_px,
             Self::TipError => quality.tip_error_95_mm,
+            Self::Reach => quality.reach_error_95_mm,
+            Self::ReachCorrected => quality.reach_error_corrected_95_mm,
             Self::RobotPosition => quality.robot_sigma_mm,
             Self::RobotOrientation => quality.robot_sigma_deg,
         }

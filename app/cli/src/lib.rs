@@ -10,6 +10,7 @@ mod box_arg;
 mod calibrate;
 mod cell;
 mod cell_choice;
+mod correct;
 mod doctor;
 pub(crate) mod driver;
 mod export;
@@ -118,6 +119,9 @@ enum Command {
     /// Write calibration files from a solved session or a result JSON.
     #[command(after_help = export::EXAMPLES)]
     Export(export::ExportArgs),
+    /// Say what to command so that the tip gets where it shall be, by the errors of the arm that a calibration found.
+    #[command(after_help = correct::EXAMPLES)]
+    Correct(correct::CorrectArgs),
     /// Print a target as a PDF at exact physical scale, with rulers to check the print.
     #[command(after_help = target::EXAMPLES)]
     Target(target::TargetArgs),
@@ -174,6 +178,7 @@ pub fn main() -> ExitCode {
         Command::Driver(args) => driver::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Import(args) => import::run(&args),
+        Command::Correct(args) => correct::run(&args),
         Command::Target(args) => target::run(&args),
     };
     ended(result)

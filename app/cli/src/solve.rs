@@ -14,7 +14,9 @@ use handeye_export::{ExportInput, ExportNames};
 use handeye_geometry::progress::CancelToken;
 use handeye_result::guided_record::GuidedRecord;
 use handeye_result::{CalibrationResult, ViewRecordStatus};
-use handeye_session::{self as session, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations};
+use handeye_session::{
+    self as session, ArmOfViews, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations,
+};
 
 use super::output::Output;
 use super::{Failure, out};
@@ -63,7 +65,12 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
         };
         let captures = observations.views.iter().map(id_of).collect();
         let sha256 = dataset.input_sha256().map_err(Failure::unusable)?;
-        let seen = SessionObservations { observations, captures, verification: Vec::new() };
+        let placement = dataset.arm.as_ref().and_then(|arm| arm.placement.as_ref().ok());
+        let arm = placement.map(|placement| ArmOfViews {
+            arm: placement.arm.clone(),
+            joints_rad: dataset.entries.iter().map(|entry| entry.joints_rad.clone()).collect(),
+        });
+        let seen = SessionObservations { observations, captures, verification: Vec::new(), arm };
         Input { document: Arc::new(document), seen, sha256 }
     };
     let views = &input.seen.observations.views;
@@ -166,7 +173,7 @@ impl Solution {
         recorder.note(Entry::Step(Step::Solve));
         let (folder, document) = (Some(self.folder.clone()), Arc::clone(&self.input.document));
         recorder.note(Entry::Document { folder, document });
-        let SessionObservations { observations, captures, verification } = &self.input.seen;
+        let SessionObservations { observations, captures, verification, .. } = &self.input.seen;
         let fitted = captures.iter().zip(&observations.views).map(|(id, view)| (id, view.corners.clone(), view.depth));
         let verifying = verification.iter().map(|(id, view)| (id, Some(view.corners.clone()), view.depth));
         for (id, corners, depth) in fitted.chain(verifying) {
@@ -202,16 +209,15 @@ pub fn folder(
 
 /// What is asked about a folder that was read.
 pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
-    let SessionObservations { observations, captures, verification } = input.seen.clone();
+    let SessionObservations { observations, captures, verification, arm } = input.seen.clone();
     let goal_m = Goal::default().0;
-    SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, truth: None }
+    SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, arm, truth: None }
 }
 
 /// Where there is no answer the data may be at fault: how the poses were written is reported at once, the rest by the doctor.
 pub fn unsolved(error: CalibrateError, folder: &Path, observations: &Observations, cancel: &CancelToken) -> Failure {
     match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
-        CalibrateError::NeedsCorners { .. } => Failure::unusable(error),
         error => match misread(observations, cancel) {
             Some(why) => Failure::failed(anyhow!("{error}: {why}")),
             None => Failure::failed(anyhow!("{error}; `handeye doctor {}` examines the data", folder.display())),

@@ -17,9 +17,9 @@
 //! - prismatic joint with `ξ_j = [Rᵀ z_j; 0]`.
 //!
 //! This needs the axes and where the tip *is*, not what is between flange and tip: with the tip pose that the controller
-//! reports, the tool need not be known ([`Arm::tip_by_joint_at`]).
+//! reports, the tool need not be known ([`Arm::tip_from_joints`]).
 //!
-//! What joint offsets do to a calibration, and which of them it can find, is in `docs/maths/joint_offsets.md`; which arms
+//! What errors of an arm do to a calibration, and which of them it can find, is in `docs/maths/arm_errors.md`; which arms
 //! there are, and where their numbers come from, in `docs/reference/arms.md`.
 //!
 //! # Reference
@@ -54,7 +54,7 @@ pub mod testing;
 pub mod urdf;
 mod values;
 
-use nalgebra::{Isometry3, Matrix6xX, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6xX, UnitQuaternion, UnitVector3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -227,18 +227,26 @@ impl Arm {
         Ok(twists(&axes, &(base_from_flange * self.flange_from_tip)))
     }
 
-    /// As [`Self::tip_by_joint`], at the tip pose that the controller reports. Of the arm, `flange_from_tip` does not
-    /// matter and `base_from_first` does; `handeye_estimate::placement` finds it.
+    /// The joints at rest in the frame of the tip, as [`View::tip_from_joints`] has them: a frame for each whose z axis it turns
+    /// about. At the tip pose that the controller reports: of the arm, `flange_from_tip` does not matter and `base_from_first`
+    /// does; `handeye_estimate::placement` finds it.
+    ///
+    /// [`View::tip_from_joints`]: handeye_geometry::targets::observation::View::tip_from_joints
     ///
     /// # Errors
     /// As [`Self::forward`].
-    pub fn tip_by_joint_at(
+    pub fn tip_from_joints(
         &self,
         base_from_tip: &Pose<Base, Tip>,
         joints: &[f64],
-    ) -> Result<Vec<Vector6<f64>>, ArmError> {
+    ) -> Result<Vec<Isometry3<f64>>, ArmError> {
         self.check(joints)?;
-        Ok(twists(&self.axes(joints).0, base_from_tip.isometry()))
+        let tip_from_base = base_from_tip.isometry().inverse();
+        let mut frames = Vec::with_capacity(joints.len());
+        self.walk(joints, |i, base_from_joint, _| {
+            frames.push(tip_from_base * base_from_joint * about_z(&self.joints[i].axis));
+        });
+        Ok(frames)
     }
 
     fn check(&self, joints: &[f64]) -> Result<(), ArmError> {
@@ -269,6 +277,12 @@ impl Arm {
         let base_from_flange = self.walk(joints, |i, at_rest, _| axes.push(Axis::of(&self.joints[i], at_rest)));
         (axes, base_from_flange)
     }
+}
+
+/// `joint_from_axis`: the shortest turn that has z along an axis.
+fn about_z(axis: &UnitVector3<f64>) -> UnitQuaternion<f64> {
+    let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), axis).unwrap_or_else(half_turn)
 }
 
 /// What no place on an arm has.

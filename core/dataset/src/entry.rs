@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use nalgebra::Vector6;
+use nalgebra::Isometry3;
 
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::observation::Corner;
@@ -18,9 +18,9 @@ pub struct Entry {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Joint angles as the controller reported them, radians; `None` when the pose table has none.
     pub joints_rad: Option<Vec<f64>>,
-    /// How the tip moves with each joint, see [`handeye_arm::Arm::tip_by_joint_at`]; empty without joint angles, without
+    /// Where the joints are at the tip, see [`handeye_arm::Arm::tip_from_joints`]; empty without joint angles, without
     /// the arm, or where the two do not fit the poses, see [`Dataset::arm`](super::Dataset::arm).
-    pub tip_by_joint: Vec<Vector6<f64>>,
+    pub tip_from_joints: Vec<Isometry3<f64>>,
     /// Corners detected elsewhere, sorted by index, empty when the target was not found in this image; `None` when
     /// the data set has no corner table.
     pub corners: Option<Vec<Corner>>,

@@ -7,7 +7,7 @@ use super::Entry;
 use super::error::DatasetProblem;
 use crate::value::{AngleUnit, Spanning, bad};
 use handeye_arm::{ArmKind, ArmModel, MAX_JOINTS};
-use handeye_estimate::placement::{self, JointView, Placement, PlacementError, TipByJoint};
+use handeye_estimate::placement::{self, JointView, Placement, PlacementError, TipFromJoints};
 
 /// The columns of joint angles, after those of the rotation.
 pub(super) const COLUMNS: [&str; MAX_JOINTS] =
@@ -81,24 +81,24 @@ pub struct DatasetArm {
     /// The arm as `[robot.arm]` names it.
     pub model: ArmModel,
     /// Where it stands and how far each view, in the order of the entries, is from it; why the joint angles are not
-    /// used otherwise. Then every [`Entry::tip_by_joint`] is empty.
+    /// used otherwise. Then every [`Entry::tip_from_joints`] is empty.
     pub placement: Result<Placement, PlacementError>,
 }
 
 impl DatasetArm {
-    /// Checks the joint angles against the poses, and fills in how the tip moves with each joint where they fit.
+    /// Checks the joint angles against the poses, and fills in where the joints are at the tip where they fit.
     pub(super) fn of(model: ArmModel, entries: &mut [Entry]) -> Self {
         let placement = placed(&model, entries);
-        if let Ok((_, twists)) = &placement {
-            for (entry, twists) in entries.iter_mut().zip(twists) {
-                entry.tip_by_joint.clone_from(twists);
+        if let Ok((_, of_views)) = &placement {
+            for (entry, frames) in entries.iter_mut().zip(of_views) {
+                entry.tip_from_joints.clone_from(frames);
             }
         }
         Self { model, placement: placement.map(|(placement, _)| placement) }
     }
 }
 
-fn placed(model: &ArmModel, entries: &[Entry]) -> Result<(Placement, TipByJoint), PlacementError> {
+fn placed(model: &ArmModel, entries: &[Entry]) -> Result<(Placement, TipFromJoints), PlacementError> {
     // Every row of the table has a pose and joint angles.
     let views: Vec<JointView<'_>> = entries
         .iter()

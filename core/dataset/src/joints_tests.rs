@@ -5,6 +5,7 @@ use super::*;
 use crate::Dataset;
 use handeye_estimate::placement::DISTANCE_LIMIT_M;
 use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::targets::observation::tip_by_joint;
 
 /// Degrees, as a person would copy them from a panel.
 const JOINTS_DEG: [[f64; 6]; 5] = [
@@ -74,7 +75,7 @@ fn joint_angles_and_an_arm_tell_how_the_tip_moves_with_each_joint() {
                 handeye_geometry::se3::log((tip(&radians(deg)).inverse() * tip(&q)).isometry())
             };
             let difference = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
-            assert!((difference - entry.tip_by_joint[j]).norm() < 1e-8, "joint {}", j + 1);
+            assert!((difference - tip_by_joint(&entry.tip_from_joints[j])).norm() < 1e-8, "joint {}", j + 1);
         }
     }
 }
@@ -87,8 +88,13 @@ fn the_rows_of_an_arm_do_as_well_as_its_name() {
               [0, 0, 0.07495, 0]]\n";
     let (by_rows, by_name) = (read(dh, SIX, &JOINTS_DEG), read(UR5, SIX, &JOINTS_DEG));
     for (a, b) in by_rows.expect("rows").entries.iter().zip(&by_name.expect("a name").entries) {
-        assert!(a.tip_by_joint.iter().zip(&b.tip_by_joint).all(|(a, b)| (a - b).norm() < 1e-9));
-        assert_eq!(a.tip_by_joint.len(), 6);
+        assert!(
+            a.tip_from_joints
+                .iter()
+                .zip(&b.tip_from_joints)
+                .all(|(a, b)| { (tip_by_joint(a) - tip_by_joint(b)).norm() < 1e-9 })
+        );
+        assert_eq!(a.tip_from_joints.len(), 6);
     }
 }
 
@@ -97,7 +103,7 @@ fn joint_angles_without_an_arm_are_kept_and_not_used() {
     let data = read("joints = 6\njoint_unit = \"rad\"\n", SIX, &JOINTS_DEG.map(|deg| radians(&deg))).expect("read");
     assert_eq!(data.arm, None);
     assert_eq!(data.entries[1].joints_rad.as_deref(), Some(&radians(&JOINTS_DEG[1])[..]));
-    assert!(data.entries.iter().all(|entry| entry.tip_by_joint.is_empty()));
+    assert!(data.entries.iter().all(|entry| entry.tip_from_joints.is_empty()));
 }
 
 #[test]
@@ -111,7 +117,7 @@ fn joint_angles_that_do_not_belong_to_the_poses_are_not_used_and_the_data_set_sa
         let data = read(UR5, SIX, &joints).expect("it reads");
         let why = data.arm.expect("an arm").placement.expect_err(what);
         assert!(matches!(why, PlacementError::Foreign { .. }), "{what}: {why}");
-        assert!(data.entries.iter().all(|entry| entry.tip_by_joint.is_empty()), "{what}");
+        assert!(data.entries.iter().all(|entry| entry.tip_from_joints.is_empty()), "{what}");
         assert!(data.entries.iter().all(|entry| entry.joints_rad.is_some()), "{what}: kept");
     }
     // Rounded to half a degree the tip is off by 4 mm at most for each of the joints that are far from it.

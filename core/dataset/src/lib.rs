@@ -33,6 +33,7 @@
 
 mod config;
 mod corners;
+pub mod correct_table;
 mod entry;
 mod error;
 mod images;
@@ -179,7 +180,7 @@ impl Dataset {
                 image_path: size.map(|_| folder.join(&view.path)),
                 base_from_tip: view.pose.zip(direction).map(|(pose, direction)| base_from_tip(pose, direction)),
                 joints_rad: view.joints_rad.clone(),
-                tip_by_joint: Vec::new(),
+                tip_from_joints: Vec::new(),
                 corners,
                 camera_from_target: target_poses
                     .remove(&view.path)

@@ -27,7 +27,7 @@ impl Dataset {
                 None => detected(index),
             };
             ObservedView {
-                tip_by_joint: entry.tip_by_joint.clone(),
+                tip_from_joints: entry.tip_from_joints.clone(),
                 camera_from_target: entry.camera_from_target,
                 ..ObservedView::new(&entry.name, entry.base_from_tip, corners)
             }

@@ -133,7 +133,7 @@ fn angle(table: &Table<'_>, row: &Row, column: usize, unit: AngleUnit, key: &'st
     Ok(angle)
 }
 
-fn unit_quaternion(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>, DatasetProblem> {
+pub(super) fn unit_quaternion(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>, DatasetProblem> {
     let length = q.norm();
     if (length - 1.0).abs() > UNIT_TOLERANCE {
         return Err(DatasetProblem::NotUnit { length, tolerance: UNIT_TOLERANCE });

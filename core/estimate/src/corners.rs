@@ -1,5 +1,6 @@
 //! Calibration from corners.
 
+use super::arm_fit::arm_fit;
 use super::detected_view::DetectedView;
 use super::lens::Lens;
 use super::refine::{self, Judged, Refined};
@@ -177,6 +178,9 @@ impl Session<'_> {
         let problem = self.problem(&refined, &fitted, lens);
         let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
         take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
+        if let Some(joint) = &mut calibration.joint {
+            joint.arm = arm_fit(&problem, &refined.screened.solution, work)?;
+        }
         Ok(calibration)
     }
 }
@@ -290,7 +294,7 @@ fn with_robot(
         };
         views.push(View {
             corners: s.corners.clone(),
-            tip_by_joint: s.view.tip_by_joint.clone(),
+            tip_from_joints: s.view.tip_from_joints.clone(),
             depth: s.view.depth,
             ..View::new(s.view.name.clone(), base_from_tip, Vec::new())
         });
@@ -346,7 +350,7 @@ fn take_joint(
             scale_sigma: solution.scale_sigma(),
         }),
         size: judged.size,
-        joint_offsets: refined.joints.clone(),
+        arm: None,
     });
     let points = problem.board.points(&solution.shape);
     for (i, s) in seen.iter().enumerate() {

@@ -72,14 +72,18 @@
 //! | [`uncertainty`] | covariance, overdispersion, expected error of a point |
 //! | [`diagnose`] | hypotheses about conventions and pairing, findings, the doctor, the calibration that states its error |
 //! | [`verify`] | predictions for views outside the fit, depth cameras |
+//! | [`corrected_arm`] | where the tip of an arm with errors really is, and what to command instead |
+//! | [`reach_error`] | how near a tool arrives at a point that the camera saw |
 //! | [`clock_offset`], [`resolution`], [`shared_lens`], [`placement`] | clocks of camera and robot, resolution of poses, several cameras of a kind, an arm by its joint values |
 //!
 //! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
 //! cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
 
+mod arm_fit;
 mod bend;
 pub mod clock_offset;
 mod corners;
+pub mod corrected_arm;
 mod detected_view;
 pub mod diagnose;
 pub mod handeye;
@@ -87,6 +91,7 @@ pub mod intrinsics;
 mod lens;
 mod pairs;
 pub mod placement;
+pub mod reach_error;
 mod refine;
 mod residuals;
 pub mod resolution;
@@ -102,6 +107,7 @@ mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2};
 
+pub use crate::arm_fit::ArmFit;
 use crate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::{
@@ -167,23 +173,6 @@ pub struct Options {
     /// Estimate the true size of the target, or with poses of the target alone the unit of their translations; the robot's
     /// translations tell it.
     pub free_scale: bool,
-    /// Try constant offsets of the robot's joints, and take them when held-out views say so.
-    pub joint_offsets: bool,
-}
-
-/// Offsets of the robot's joints as the data see them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointOffsets {
-    /// To be added to the reported angles, radians.
-    pub offsets_rad: Vec<f64>,
-    /// Their standard deviations, radians.
-    pub sigma_rad: Vec<f64>,
-    /// Error on held-out views without them, pixels.
-    pub heldout_before_px: f64,
-    /// And with them.
-    pub heldout_after_px: f64,
-    /// Whether the answer uses them.
-    pub accepted: bool,
 }
 
 /// What an attempt at the depths of the views gave.
@@ -298,15 +287,6 @@ pub enum CalibrateError {
     NoRobotPose {
         /// Which view.
         name: String,
-    },
-    /// An option that poses of the target alone cannot serve.
-    #[error(
-        "{what} is estimated from corners, and there are only poses of the target: leave that option out, or give images or \
-         corners"
-    )]
-    NeedsCorners {
-        /// What was to be estimated.
-        what: &'static str,
     },
     /// Neither corners nor target poses.
     #[error("view {name:?} has neither corners nor a target pose")]
@@ -496,8 +476,8 @@ pub struct JointFit {
     pub shape: Option<ShapeEstimate>,
     /// Its size by the robot's motion; `None` where that says nothing of it.
     pub size: Option<TargetSize>,
-    /// What an attempt at joint offsets gave; `None` when there was none.
-    pub joint_offsets: Option<JointOffsets>,
+    /// The errors of the robot's arm and the transforms that go with them; `None` where its joints are not known.
+    pub arm: Option<ArmFit>,
     /// What an attempt at the depths of the views gave; `None` when there was none.
     pub depths: Option<JointDepths>,
 }
@@ -624,9 +604,6 @@ pub fn fit_with<'a>(
     let used = || observations.views.iter().filter(|v| v.in_fit);
     let only_poses = used().all(|v| v.corners.is_none()) && used().any(|v| v.camera_from_target.is_some());
     if only_poses {
-        if options.joint_offsets {
-            return Err(CalibrateError::NeedsCorners { what: "the offset of joints" });
-        }
         pairs::calibrate(observations, method, options, &work)
     } else {
         corners::calibrate(observations, method, options, &work)

@@ -46,14 +46,6 @@ fn off_m(calibration: &Fit, truth: &HandEye) -> f64 {
     calibration.hand_eye.expect("a robot").mount_from_camera().distance_to(&truth.mount_from_camera()).0
 }
 
-#[test]
-fn offsets_of_joints_need_corners() {
-    let (observations, _) = session(Mode::EyeInHand, 8, 1.0, 50);
-    let options = Options { joint_offsets: true, ..Options::default() };
-    let error = fit_with(&observations, Method::Joint, options, &CancelToken::default()).expect_err("nothing says it");
-    assert!(matches!(error, CalibrateError::NeedsCorners { .. }), "{error}");
-}
-
 /// Left in, they put the camera centimetres off.
 #[test]
 fn wrong_poses_are_left_out_and_the_answer_is_that_of_the_others() {

@@ -1,6 +1,6 @@
 //! Where an arm stands and what its tool is, from joint angles and reported poses; and whether the two belong together.
 
-use nalgebra::Vector6;
+use nalgebra::Isometry3;
 
 use crate::handeye::closed_form::{ClosedForm as _, Shah};
 use crate::handeye::{HandEyeError, PosePair};
@@ -14,9 +14,9 @@ pub enum PlacementError {
     /// The joint values are of no use.
     #[error(transparent)]
     Arm(#[from] ArmError),
-    /// An offset of a length, for which an estimate of joint offsets has no place.
+    /// An offset of a length, for which an estimate of the arm's errors has no place.
     #[error(
-        "joint {joint} ({name}) is prismatic, and joint offsets are estimated of revolute joints alone: calibrate without \
+        "joint {joint} ({name}) is prismatic, and errors of an arm are estimated of revolute joints alone: calibrate without \
          the joint values of this arm"
     )]
     PrismaticOffset {
@@ -68,8 +68,8 @@ pub struct JointView<'a> {
     pub joints_rad: &'a [f64],
 }
 
-/// How the tip moves with each joint, view by view, see [`Arm::tip_by_joint`].
-pub type TipByJoint = Vec<Vec<Vector6<f64>>>;
+/// The joints at the tip, view by view, see [`Arm::tip_from_joints`].
+pub type TipFromJoints = Vec<Vec<Isometry3<f64>>>;
 
 /// An arm put where the poses say that it stands.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,25 +81,25 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// How the tip moves with each joint in a view that need not be one of those that placed the arm.
+    /// The joints at the tip in a view that need not be one of those that placed the arm.
     ///
     /// # Errors
     /// [`ArmError::WrongCount`], [`ArmError::NotFinite`], [`PlacementError::PrismaticOffset`]; [`PlacementError::Foreign`] when its
     /// joint values do not belong to its pose.
-    pub fn tip_by_joint(&self, view: &JointView<'_>) -> Result<Vec<Vector6<f64>>, PlacementError> {
+    pub fn tip_from_joints(&self, view: &JointView<'_>) -> Result<Vec<Isometry3<f64>>, PlacementError> {
         let miss = self.arm.forward(view.joints_rad)?.distance_to(&view.base_from_tip);
         Self { arm: self.arm.clone(), misses: vec![miss] }.check()?;
-        self.by_joint(view)
+        self.joints_of(view)
     }
 
-    /// How the tip moves with each joint, for an estimate of joint offsets. That takes, states and judges angles: the
-    /// offset of a length has no place in it, and one in radians would be wrong without anybody seeing it.
-    fn by_joint(&self, view: &JointView<'_>) -> Result<Vec<Vector6<f64>>, PlacementError> {
+    /// The joints at the tip, for an estimate of the arm's errors. That knows zeros that are angles: the offset of a length has no
+    /// place in it, and one in radians would be wrong without anybody seeing it.
+    fn joints_of(&self, view: &JointView<'_>) -> Result<Vec<Isometry3<f64>>, PlacementError> {
         let joints = self.arm.joints();
         if let Some(i) = joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
             return Err(PlacementError::PrismaticOffset { joint: i + 1, name: joints[i].name.clone() });
         }
-        Ok(self.arm.tip_by_joint_at(&view.base_from_tip, view.joints_rad)?)
+        Ok(self.arm.tip_from_joints(&view.base_from_tip, view.joints_rad)?)
     }
 
     /// Root mean square of the distances, metres.
@@ -171,16 +171,16 @@ pub fn place(arm: &Arm, views: &[JointView<'_>]) -> Result<Placement, PlacementE
     Ok(Placement { arm: bare.mounted(base_from_first, flange_from_tip), misses })
 }
 
-/// Finds where the arm stands, see [`place`], checks that joint angles and poses belong together, and says how the tip
-/// moves with each joint in every view, see [`Arm::tip_by_joint_at`].
+/// Finds where the arm stands, see [`place`], checks that joint angles and poses belong together, and says where its
+/// joints are at the tip in every view, see [`Arm::tip_from_joints`].
 ///
 /// # Errors
-/// Those of [`place`], [`PlacementError::Foreign`], and [`PlacementError::PrismaticOffset`]: an estimate of joint offsets, which is what
-/// the twists are for, knows revolute joints alone.
-pub fn place_checked(arm: &Arm, views: &[JointView<'_>]) -> Result<(Placement, TipByJoint), PlacementError> {
+/// Those of [`place`], [`PlacementError::Foreign`], and [`PlacementError::PrismaticOffset`]: an estimate of the arm's errors, which is
+/// what the frames are for, knows revolute joints alone.
+pub fn place_checked(arm: &Arm, views: &[JointView<'_>]) -> Result<(Placement, TipFromJoints), PlacementError> {
     let placement = place(arm, views)?;
     placement.check()?;
-    let twists = views.iter().map(|view| placement.by_joint(view)).collect::<Result<_, _>>()?;
+    let twists = views.iter().map(|view| placement.joints_of(view)).collect::<Result<_, _>>()?;
     Ok((placement, twists))
 }
 

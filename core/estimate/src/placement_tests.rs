@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use handeye_arm::{ArmKind, ArmModel, DhRow, Joint, JointRange};
 use handeye_geometry::se3;
+use handeye_geometry::targets::observation::tip_by_joint;
 
 fn model_ur5() -> Arm {
     ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in")
@@ -50,7 +51,7 @@ fn gantry() -> Arm {
 }
 
 #[test]
-fn an_arm_with_a_prismatic_joint_is_placed_and_checked_but_has_no_joint_offsets() {
+fn an_arm_with_a_prismatic_joint_is_placed_and_checked_but_has_no_errors_estimated() {
     let arm = gantry();
     let joints: Vec<Vec<f64>> = configurations(10).iter().map(|q| q[..5].to_vec()).collect();
     let views = views(&arm, &joints);
@@ -58,7 +59,7 @@ fn an_arm_with_a_prismatic_joint_is_placed_and_checked_but_has_no_joint_offsets(
     placement.check().expect("they belong together");
     let refused = PlacementError::PrismaticOffset { joint: 1, name: "prismatic".to_owned() };
     assert_eq!(place_checked(&gantry(), &views).expect_err("metres"), refused);
-    assert_eq!(placement.tip_by_joint(&views[0]).expect_err("metres"), refused);
+    assert_eq!(placement.tip_from_joints(&views[0]).expect_err("metres"), refused);
 }
 
 #[test]
@@ -73,10 +74,10 @@ fn poses_and_joint_angles_tell_where_the_arm_stands_and_what_its_tool_is() {
     assert!(rms_m < 1e-9 && worst_rad < 1e-7, "acos near 1 has half the digits");
     placement.check().expect("they belong together");
 
-    let (_, twists) = place_checked(&model_ur5(), &views(&arm, &joints)).expect("they belong together");
-    for (q, found) in joints.iter().zip(&twists) {
+    let (_, frames) = place_checked(&model_ur5(), &views(&arm, &joints)).expect("they belong together");
+    for (q, found) in joints.iter().zip(&frames) {
         for (a, b) in found.iter().zip(arm.tip_by_joint(q).expect("six joints")) {
-            assert!((a - b).norm() < 1e-8);
+            assert!((tip_by_joint(a) - b).norm() < 1e-8);
         }
     }
 }

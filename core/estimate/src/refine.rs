@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::bend::{Deflection, may_be_shown};
 use super::lens::Lens;
-use super::{CalibrateError, DepthsInFit, JointOffsets, MethodResult, Options, TargetSize, size};
+use super::{CalibrateError, DepthsInFit, MethodResult, Options, TargetSize, size};
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::consensus::{Consensus, consensus};
 use crate::handeye::joint::outliers::{Screened, estimate_screened};
@@ -33,8 +33,6 @@ use handeye_geometry::targets::observation::{Corners, View};
 pub struct Refined {
     pub screened: Screened,
     pub weights: Option<CornerWeights>,
-    /// What an attempt at joint offsets gave; `None` when there was none.
-    pub joints: Option<JointOffsets>,
     /// What an attempt at the depths of the views gave; `None` when there was none.
     pub depths: Option<DepthsInFit>,
     /// What the other model of the depth camera adds, where the answer uses its depths.
@@ -126,13 +124,12 @@ pub fn refine(
     if let Some(with_print) = with_print {
         screened = again(&JointProblem { free: with_print.free, ..problem }, with_print, screened)?;
     }
-    let joints = if options.joint_offsets { offsets(&problem, &mut screened, work)? } else { None };
     if let Some(with_field) = with_shown_field(&problem, &screened.kept_views(), &screened.solution, *work)? {
         screened = again(&JointProblem { free: with_field.free, ..problem }, with_field, screened)?;
     }
     let (depths, other_depths) = depths(&problem, &mut screened, work)?.unzip();
     let other_depths = other_depths.flatten();
-    Ok(Refined { screened, weights, joints, depths, other_depths, print, distortion: None })
+    Ok(Refined { screened, weights, depths, other_depths, print, distortion: None })
 }
 
 impl Refined {
@@ -193,10 +190,6 @@ impl Refined {
         if let Some(shown) = &self.distortion {
             let solution = self.screened.solution.clone();
             self.screened.solution = with_its_error(problem, solution, shown, work.cancel)?;
-        }
-        if let Some(joints) = self.joints.as_mut().filter(|joints| joints.accepted) {
-            joints.offsets_rad.clone_from(&self.screened.solution.joint_offsets_rad);
-            joints.sigma_rad = self.screened.solution.joint_offsets_sigma();
         }
         Ok(self)
     }
@@ -281,40 +274,6 @@ fn printed(
     let with_print = JointProblem { board: &board, ..flat };
     let is_bent = bent(&with_print, &views, &solution, Some(&print), work)?.is_some();
     Ok(if is_bent { shown } else { Some((print, solution)) })
-}
-
-/// Tries joint offsets and takes them when held-out views are predicted better by them, by more than chance.
-fn offsets(
-    problem: &JointProblem<'_>,
-    screened: &mut Screened,
-    work: &Work<'_>,
-) -> Result<Option<JointOffsets>, HandEyeError> {
-    let views = screened.kept_views();
-    if views.iter().any(|view| view.tip_by_joint.is_empty()) {
-        return Ok(None);
-    }
-    let without = kept_problem(problem, &views, &screened.solution);
-    let with = JointProblem { free: Free { joints: true, ..without.free }, ..without };
-    let fit = joint::fit(&with, &screened.solution.as_start(), work.cancel);
-    let Some(solution) = determined(fit)? else { return Ok(None) };
-    let before = quality::held_out_squares_px(&without, &screened.solution, work.cancel)?;
-    let after = quality::held_out_squares_px(&with, &solution, work.cancel)?;
-    let (Some(before), Some(after)) = (before, after) else { return Ok(None) };
-    let gains: Vec<f64> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
-    let accepted = gains.iter().sum::<f64>() > 0.0 && better_by_chance(&gains) < quality::BY_CHANCE;
-    let corners: usize = views.iter().map(|view| view.corners.len()).sum();
-    let rms_px = |squares: &[f64]| (squares.iter().sum::<f64>() / corners as f64).sqrt();
-    let found = JointOffsets {
-        offsets_rad: solution.joint_offsets_rad.clone(),
-        sigma_rad: solution.joint_offsets_sigma(),
-        heldout_before_px: rms_px(&before),
-        heldout_after_px: rms_px(&after),
-        accepted,
-    };
-    if accepted {
-        screened.solution = solution;
-    }
-    Ok(Some(found))
 }
 
 /// Probability that views left out are predicted worse by chance, below which they are worse: one session in twenty goes without

@@ -1,6 +1,6 @@
 //! What a session saw, as an estimator is given it: who carries the camera, what is known of the lens, and one entry per image.
 
-use nalgebra::Vector6;
+use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Distortion, Intrinsics};
@@ -55,8 +55,8 @@ pub struct ObservedView {
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// The corners; `None` when the target was not found.
     pub corners: Option<Corners>,
-    /// How the tip turns with each joint, as in [`View::tip_by_joint`]; empty where it is not known.
-    pub tip_by_joint: Vec<Vector6<f64>>,
+    /// The joints of the arm at the reported pose, as in [`View::tip_from_joints`]; empty where they are not known.
+    pub tip_from_joints: Vec<Isometry3<f64>>,
     /// The plane of the target by the depths of the image; `None` where none were measured.
     pub depth: Option<DepthPlane>,
     /// A target pose measured elsewhere, used when there are no corners.
@@ -72,7 +72,7 @@ impl ObservedView {
             name: name.into(),
             base_from_tip,
             corners,
-            tip_by_joint: Vec::new(),
+            tip_from_joints: Vec::new(),
             depth: None,
             camera_from_target: None,
             in_fit: true,
@@ -84,7 +84,7 @@ impl From<&View> for ObservedView {
     /// A view that takes part.
     fn from(view: &View) -> Self {
         Self {
-            tip_by_joint: view.tip_by_joint.clone(),
+            tip_from_joints: view.tip_from_joints.clone(),
             depth: view.depth,
             corners: Some(view.corners.clone()),
             ..Self::new(view.name.clone(), Some(view.base_from_tip), None)
@@ -132,10 +132,26 @@ pub struct Noise {
     pub field_m: f64,
     /// Of the reported tip orientation likewise, radians.
     pub field_rad: f64,
+    /// Of the angles of an arm's links (zeros of its joints, directions of their axes), radians. Zero where they are not in the
+    /// model, as the next two.
+    pub link_rad: f64,
+    /// Of the lengths of its links (places of the axes), metres.
+    pub link_m: f64,
+    /// Of what its joints give way by under gravity, radians where all of the arm is stretched out.
+    pub compliance_rad: f64,
 }
 
 impl Noise {
     /// None at all.
-    pub const EXACT: Self =
-        Self { corner_px: 0.0, view_px: 0.0, robot_m: 0.0, robot_rad: 0.0, field_m: 0.0, field_rad: 0.0 };
+    pub const EXACT: Self = Self {
+        corner_px: 0.0,
+        view_px: 0.0,
+        robot_m: 0.0,
+        robot_rad: 0.0,
+        field_m: 0.0,
+        field_rad: 0.0,
+        link_rad: 0.0,
+        link_m: 0.0,
+        compliance_rad: 0.0,
+    };
 }

@@ -18,7 +18,7 @@ type PairSigmas = Option<(f64, f64)>;
 
 /// The result document as JSON, and the disagreement of pose pairs.
 #[pyfunction]
-#[pyo3(signature = (observations, method, keep_outliers, free_scale, joint_offsets, goal_mm, progress))]
+#[pyo3(signature = (observations, method, keep_outliers, free_scale, goal_mm, progress))]
 #[expect(clippy::too_many_arguments, reason = "the wrapper in Python has names for them")]
 pub fn calibrate(
     py: Python<'_>,
@@ -26,12 +26,11 @@ pub fn calibrate(
     method: &str,
     keep_outliers: bool,
     free_scale: bool,
-    joint_offsets: bool,
     goal_mm: Option<f64>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> Result<(String, PairSigmas), Failure> {
     let method = method_by_name(method)?;
-    let options = Options { keep_outliers, free_scale, joint_offsets };
+    let options = Options { keep_outliers, free_scale };
     let observations = observations.get();
     let (mut result, sigmas) = run(py, progress, |work| {
         let observed = &observations.observed;

@@ -34,7 +34,7 @@ impl Failure {
 impl From<CalibrateError> for Failure {
     fn from(error: CalibrateError) -> Self {
         match error {
-            CalibrateError::NeedsCorners { .. } | CalibrateError::NothingObserved { .. } => Self::input(error),
+            CalibrateError::NothingObserved { .. } => Self::input(error),
             error => Self::NoAnswer(error.to_string()),
         }
     }

@@ -24,17 +24,17 @@ pub struct BadResult {
     pub problem: &'static str,
 }
 
-type Checked = Result<(), BadResult>;
+pub(super) type Checked = Result<(), BadResult>;
 
-fn require(holds: bool, at: impl Into<String>, problem: &'static str) -> Checked {
+pub(super) fn require(holds: bool, at: impl Into<String>, problem: &'static str) -> Checked {
     if holds { Ok(()) } else { Err(BadResult { at: at.into(), problem }) }
 }
 
-fn all_finite(values: &[f64], at: &str) -> Checked {
+pub(super) fn all_finite(values: &[f64], at: &str) -> Checked {
     require(values.iter().all(|v| v.is_finite()), at, "is not finite")
 }
 
-fn not_negative(value: Option<f64>, at: &str) -> Checked {
+pub(super) fn not_negative(value: Option<f64>, at: &str) -> Checked {
     require(value.is_none_or(|v| v.is_finite() && v >= 0.0), at, "must be finite and not negative, or null")
 }
 
@@ -55,6 +55,9 @@ impl CalibrationResult {
         self.check_links()?;
         if let Some(intrinsics) = &self.intrinsics {
             intrinsics.check()?;
+        }
+        if let Some(arm) = &self.arm {
+            arm.check()?;
         }
         self.check_quality()?;
         self.check_methods()?;
@@ -87,6 +90,8 @@ impl CalibrationResult {
             ("quality.sigma_px", q.sigma_px),
             ("quality.heldout_rms_px", q.heldout_rms_px),
             ("quality.tip_error_95_mm", q.tip_error_95_mm),
+            ("quality.reach_error_95_mm", q.reach_error_95_mm),
+            ("quality.reach_error_corrected_95_mm", q.reach_error_corrected_95_mm),
             ("quality.robot_sigma_mm", q.robot_sigma_mm),
             ("quality.robot_sigma_deg", q.robot_sigma_deg),
         ];
@@ -188,9 +193,7 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
             require(px.len() == functions(*degree), key, "must have a coefficient for each polynomial of the degree")?;
         }
     }
-    let Some(joints) = &estimate.joint_offsets else { return Ok(()) };
-    all_finite(&joints.offsets_deg, "estimate.joint_offsets.offsets_deg")?;
-    all_finite(&joints.sigma_deg, "estimate.joint_offsets.sigma_deg")
+    Ok(())
 }
 
 impl TransformEstimate {

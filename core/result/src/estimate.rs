@@ -34,8 +34,6 @@ pub struct EstimateDetails {
     /// The size of the target by the robot's motion, which the answer does not count on unless `board` has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target_size: Option<TargetSizeEstimate>,
-    /// Offsets of the robot's joints, when they were asked for.
-    pub joint_offsets: Option<JointOffsetsEstimate>,
     /// Errors of the robot that depend on where it stands, where the data show them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot_field: Option<PoseDependentErrorEstimate>,
@@ -121,21 +119,6 @@ pub struct DepthsEstimate {
     /// Probability that it is the other way.
     pub other_probability: f64,
     /// Error on held-out views without the depths, pixels.
-    pub heldout_before_px: f64,
-    /// And with them, pixels.
-    pub heldout_after_px: f64,
-    /// Whether the answer uses them.
-    pub accepted: bool,
-}
-
-/// The joints as found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointOffsetsEstimate {
-    /// To be added to the reported angles, degrees.
-    pub offsets_deg: Vec<f64>,
-    /// Their standard deviations, degrees.
-    pub sigma_deg: Vec<f64>,
-    /// Error on held-out views without them, pixels.
     pub heldout_before_px: f64,
     /// And with them, pixels.
     pub heldout_after_px: f64,

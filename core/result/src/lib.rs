@@ -15,6 +15,7 @@
 //!
 //! Never depends on images or data sets.
 
+mod arm;
 mod check;
 mod estimate;
 mod file;
@@ -35,10 +36,11 @@ use handeye_estimate::verify::DepthReport;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Camera, Frame, Mount, Pose};
 
+pub use arm::{ArmEstimate, ArmLevels, HeldOutByArm, JointErrorEstimate, Unexplained};
 pub use check::BadResult;
 pub use estimate::{
-    BoardEstimate, DepthsEstimate, EstimateDetails, Findings, JointOffsetsEstimate, OverdispersionRecord,
-    PoseDependentErrorEstimate, PrintEstimate, ResidualDistortionEstimate, TargetSizeEstimate,
+    BoardEstimate, DepthsEstimate, EstimateDetails, Findings, OverdispersionRecord, PoseDependentErrorEstimate,
+    PrintEstimate, ResidualDistortionEstimate, TargetSizeEstimate,
 };
 pub use file::{ResultError, ResultProblem};
 pub use of_calibration::{TARGET_OPTION, solve_options};
@@ -72,6 +74,9 @@ pub struct CalibrationResult {
     /// Details of an estimate; `None` for a closed form, and for a camera that was given.
     #[serde(default)]
     pub estimate: Option<EstimateDetails>,
+    /// The errors of the robot's arm and the transforms that go with corrected poses; `None` where its joints are not known.
+    #[serde(default)]
+    pub arm: Option<ArmEstimate>,
     /// What is weak or wrong, the most severe first.
     #[serde(default)]
     pub findings: Findings,
@@ -232,6 +237,13 @@ pub struct Quality {
     pub heldout_rms_px: Option<f64>,
     /// Expected error where the tool works: 95 % of the errors are below, millimetres.
     pub tip_error_95_mm: Option<f64>,
+    /// Distance between a point that the camera saw and the tip of a tool that is sent there by the controller as it is: 95 % are
+    /// below, millimetres; `None` where the arm is not known.
+    #[serde(default)]
+    pub reach_error_95_mm: Option<f64>,
+    /// The same by corrected poses and commands.
+    #[serde(default)]
+    pub reach_error_corrected_95_mm: Option<f64>,
     /// Estimated noise of the robot's positions, millimetres per axis.
     pub robot_sigma_mm: Option<f64>,
     /// Estimated noise of the robot's rotations, degrees per axis.
@@ -442,6 +454,7 @@ impl Default for CalibrationResult {
             methods: Vec::new(),
             views: Vec::new(),
             estimate: None,
+            arm: None,
             findings: Vec::new(),
             verification: None,
             depth: None,

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix3;
 
 use super::{
-    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate,
-    MethodRecord, OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Provenance, Quality,
-    ResidualDistortionEstimate, TargetSizeEstimate, ViewRecord, ViewRecordStatus,
+    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, MethodRecord,
+    OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate,
+    TargetSizeEstimate, ViewRecord, ViewRecordStatus,
 };
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::handeye::joint::{PoseDependentError, PrintErrors, ShownDistortion};
@@ -27,7 +27,6 @@ pub fn solve_options(method: Method, options: Options, target: &TargetSpec) -> B
         ("method".to_owned(), method.name().into()),
         ("keep_outliers".to_owned(), options.keep_outliers.into()),
         ("free_scale".to_owned(), options.free_scale.into()),
-        ("joint_offsets".to_owned(), options.joint_offsets.into()),
         (TARGET_OPTION.to_owned(), target),
     ])
 }
@@ -49,6 +48,8 @@ impl CalibrationResult {
                 sigma_px: noise.map(|n| n.corner_px).or_else(|| camera_alone.and_then(|fit| fit.noise_px)),
                 heldout_rms_px: calibration.joint.as_ref().and_then(|joint| joint.heldout_links_rms_px),
                 tip_error_95_mm: calibration.tip_error_95_m().map(|m| m * 1e3),
+                reach_error_95_mm: None,
+                reach_error_corrected_95_mm: None,
                 robot_sigma_mm: noise.map(|n| n.robot_m * 1e3),
                 robot_sigma_deg: noise.map(|n| n.robot_rad.to_degrees()),
             },
@@ -93,13 +94,6 @@ fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {
             true_over_stated: size.scale,
             sigma: size.sigma,
             determined: size.is_determined(),
-        }),
-        joint_offsets: joint.joint_offsets.as_ref().map(|j| JointOffsetsEstimate {
-            offsets_deg: j.offsets_rad.iter().map(|v| v.to_degrees()).collect(),
-            sigma_deg: j.sigma_rad.iter().map(|v| v.to_degrees()).collect(),
-            heldout_before_px: j.heldout_before_px,
-            heldout_after_px: j.heldout_after_px,
-            accepted: j.accepted,
         }),
         robot_field: joint.field.as_ref().map(|field| robot_field(field, joint)),
         print: joint.print.as_ref().map(print),

@@ -1,14 +1,17 @@
 //! Results with known numbers, for tests. Feature `testing`.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector6};
 use serde_json::json;
 
 use super::{
-    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, JointOffsetsEstimate,
-    MethodRecord, OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Quality, ResidualDistortionEstimate,
+    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, MethodRecord,
+    OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Quality, ResidualDistortionEstimate,
     TargetSizeEstimate, TruthComparison, VerificationSummary, ViewRecord, ViewRecordStatus,
 };
+use handeye_arm::{Arm, ArmKind};
+use handeye_estimate::ArmFit;
 use handeye_estimate::handeye::HandEye;
+use handeye_estimate::handeye::joint::{ArmErrors, Noise, SmallSample, arm_parameters};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 
@@ -56,6 +59,8 @@ pub fn golden() -> CalibrationResult {
             renumbered: status == ViewRecordStatus::Excluded,
         })
         .collect();
+    let (chain, arm) = golden_arm();
+    result.arm = super::ArmEstimate::new(&chain, &arm);
     result.estimate = Some(EstimateDetails {
         modelled_error_95_mm: Some(0.2),
         moved_mm: Some(1.5),
@@ -70,13 +75,6 @@ pub fn golden() -> CalibrationResult {
             warp_sigma_mm: Some([0.01, 0.02]),
             scale: 1.0,
             scale_sigma: None,
-        }),
-        joint_offsets: Some(JointOffsetsEstimate {
-            offsets_deg: vec![0.0, 0.2],
-            sigma_deg: vec![1.0, 0.02],
-            heldout_before_px: 2.0,
-            heldout_after_px: 1.0,
-            accepted: true,
         }),
         robot_field: Some(PoseDependentErrorEstimate {
             origin_m: [0.4, -0.1, 0.5],
@@ -153,4 +151,31 @@ pub fn pose_pairs_only() -> CalibrationResult {
 /// The same of a camera without a robot.
 pub fn intrinsics_only() -> CalibrationResult {
     CalibrationResult { mode: None, hand_eye: None, target: None, methods: Vec::new(), ..golden() }
+}
+
+/// An arm of six joints with errors of every kind, and the fit that found them.
+pub fn golden_arm() -> (Arm, ArmFit) {
+    let joints = 6;
+    let count = arm_parameters(joints).len();
+    let errors = ArmErrors::new(joints, (0..count).map(|k| 1e-4 * (k as f64 + 1.0)).collect()).expect("so many");
+    let chain = ArmKind::Ur5e.arm();
+    let base_from_target = Pose::<Base, Target>::from_translation_xyzw([0.4, -0.1, 0.02], [0.0, 0.6, 0.0, -0.8]);
+    let fit = ArmFit {
+        errors,
+        hand_eye: HandEye::EyeInHand { tip_from_camera: golden_pose(), base_from_target },
+        covariance: DMatrix::from_diagonal_element(12 + count, 12 + count, 1e-9),
+        small_sample: SmallSample { degrees_of_freedom: 30.0, scale: 1.01, ..SmallSample::KNOWN },
+        noise: Noise {
+            corner_px: 0.1,
+            robot_m: 2e-5,
+            robot_rad: 1e-4,
+            link_rad: 1e-3,
+            link_m: 2e-4,
+            compliance_rad: 3e-4,
+            ..Noise::EXACT
+        },
+        heldout_px: Some([1.0, 0.25]),
+        contradicted: false,
+    };
+    (chain, fit)
 }

@@ -2,30 +2,33 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector6;
+use nalgebra::Isometry3;
 
 use super::capture_id::CaptureId;
 use super::document::{CaptureRecord, Document};
 use handeye_dataset as dataset;
 use handeye_dataset::write::Joints;
-use handeye_estimate::placement::{self, JointView, PlacementError};
+use handeye_estimate::placement::{self, JointView, Placement, PlacementError};
 
 impl Document {
-    /// How the tip moves with each joint in the captures, see [`handeye_arm::Arm::tip_by_joint_at`].
-    ///
-    /// The captures in use tell where the arm stands, as they do in the session's data set. Another one, excluded or
-    /// kept for verification, is there when its joint angles belong to its pose. Nothing is there when the session
-    /// names no arm, or one of the captures in use has no joint angles: the others alone would mislead.
+    /// The arm where the captures in use put it, as they do in the session's data set. `None` when the session names no arm, or one of
+    /// the captures in use has no joint angles: the others alone would mislead.
     ///
     /// # Errors
     /// [`PlacementError`] when the joint angles are of no use: they do not fit the poses with this arm, or the captures do
     /// not determine where it stands.
-    pub fn tip_by_joint(&self) -> Result<BTreeMap<CaptureId, Vec<Vector6<f64>>>, PlacementError> {
+    pub fn placement(&self) -> Result<Option<Placement>, PlacementError> {
         let in_use: Option<Vec<JointView<'_>>> = self.in_use().map(joint_view).collect();
-        let (Some(model), Some(in_use)) = (&self.meta.arm, in_use) else { return Ok(BTreeMap::new()) };
+        let (Some(model), Some(in_use)) = (&self.meta.arm, in_use) else { return Ok(None) };
         let (placement, _) = placement::place_checked(&model.arm()?, &in_use)?;
-        let twists = |capture| placement.tip_by_joint(&joint_view(capture)?).ok();
-        Ok(self.captures.iter().filter_map(|capture| Some((capture.id, twists(capture)?))).collect())
+        Ok(Some(placement))
+    }
+
+    /// Where the joints are at the tip in the captures, see [`handeye_arm::Arm::tip_from_joints`]. A capture that is excluded or kept
+    /// for verification is there when its joint angles belong to its pose.
+    pub fn tip_from_joints(&self, placement: &Placement) -> BTreeMap<CaptureId, Vec<Isometry3<f64>>> {
+        let frames = |capture| placement.tip_from_joints(&joint_view(capture)?).ok();
+        self.captures.iter().filter_map(|capture| Some((capture.id, frames(capture)?))).collect()
     }
 
     /// The session's `dataset.toml` and `poses.csv`: the captures in use and no others, so that the command line solves

@@ -29,12 +29,18 @@ fn store(folder: &std::path::Path, arm: Option<ArmModel>) -> Store {
     store
 }
 
+/// Where the joints are at the tip in the captures that know it.
+fn joints_of(document: &Document) -> BTreeMap<CaptureId, Vec<Isometry3<f64>>> {
+    let placement = document.placement().expect("they belong together").expect("an arm");
+    document.tip_from_joints(&placement)
+}
+
 #[test]
 fn the_data_set_of_a_session_has_its_joints_and_tells_the_same_of_them() {
     let dir = folder();
     let mut store = store(dir.path(), Some(ur5()));
     store.apply(Edit::SetExcluded { ids: vec![CaptureId(2)], excluded: true }).expect("exclude");
-    let by_session = store.document().tip_by_joint().expect("they belong together");
+    let by_session = joints_of(store.document());
     assert_eq!(by_session.len(), 4, "also of what is not in use");
 
     let data = Dataset::read(dir.path()).unwrap_or_else(|e| panic!("{e}"));
@@ -43,8 +49,8 @@ fn the_data_set_of_a_session_has_its_joints_and_tells_the_same_of_them() {
     for (entry, index) in data.entries.iter().zip([0, 2, 3]) {
         assert_eq!(entry.joints_rad.as_deref(), Some(&JOINTS_RAD[index][..]), "every digit");
         let of_session = &by_session[&CaptureId(index as u32 + 1)];
-        assert_eq!(entry.tip_by_joint.len(), 6);
-        assert_eq!(&entry.tip_by_joint, of_session, "to the bit: the window and the command line solve the same");
+        assert_eq!(entry.tip_from_joints.len(), 6);
+        assert_eq!(&entry.tip_from_joints, of_session, "to the bit: the window and the command line solve the same");
     }
     let reopened = Session::open(dir.path()).expect("open");
     assert_eq!(reopened.document.meta.arm, Some(ur5()));
@@ -54,7 +60,7 @@ fn the_data_set_of_a_session_has_its_joints_and_tells_the_same_of_them() {
 fn a_session_without_an_arm_is_the_data_set_that_it_was_before_there_were_any() {
     let dir = folder();
     let store = store(dir.path(), None);
-    assert_eq!(store.document().tip_by_joint(), Ok(BTreeMap::new()));
+    assert_eq!(store.document().placement(), Ok(None));
     let (description, table) = store.document().as_dataset();
     let table = table.expect("it has a robot");
     assert!(!description.contains("joint") && table.starts_with("image,x,y,z,qx,qy,qz,qw\n"), "{description}");
@@ -82,7 +88,7 @@ fn joints_of_an_arm_that_is_not_known_are_kept_in_session_and_data_set_whatever_
         let reopened = Session::open(dir.path()).expect("open").document;
         assert_eq!(reopened.meta.joint_kinds, Some(kinds));
         assert!(reopened.captures.iter().all(|capture| capture.joints_rad.as_deref() == Some(joints_rad)));
-        assert_eq!(reopened.tip_by_joint(), Ok(BTreeMap::new()), "they are not used");
+        assert_eq!(reopened.placement(), Ok(None), "they are not used");
     }
     let none = SessionMeta { joint_kinds: Some(Vec::new()), ..meta() };
     assert!(Store::create(folder().path(), none).is_err(), "an arm has a joint");
@@ -92,12 +98,12 @@ fn joints_of_an_arm_that_is_not_known_are_kept_in_session_and_data_set_whatever_
 fn joints_of_another_arm_are_an_error_and_one_capture_without_joints_leaves_them_all_out() {
     let dir = folder();
     let mut store = store(dir.path(), Some(ArmModel::Kind(ArmKind::Ur5)));
-    assert!(matches!(store.document().tip_by_joint(), Err(PlacementError::Foreign { .. })), "its zero is another");
+    assert!(matches!(store.document().placement(), Err(PlacementError::Foreign { .. })), "its zero is another");
     let id = store.add_capture(&Capture::new(&image(9), tip(&[0.0; 6]))).expect("add");
-    assert_eq!(store.document().tip_by_joint(), Ok(BTreeMap::new()));
+    assert_eq!(store.document().placement(), Ok(None));
     assert_eq!(Dataset::read(dir.path()).unwrap_or_else(|e| panic!("{e}")).arm, None);
     store.apply(Edit::SetExcluded { ids: vec![id], excluded: true }).expect("exclude");
-    assert!(matches!(store.document().tip_by_joint(), Err(PlacementError::Foreign { .. })), "it no longer counts");
+    assert!(matches!(store.document().placement(), Err(PlacementError::Foreign { .. })), "it no longer counts");
 }
 
 #[test]
@@ -107,9 +113,9 @@ fn a_capture_out_of_use_whose_joints_are_of_another_pose_has_nothing_to_tell() {
     let image = image(9);
     let wrong = Capture { joints_rad: Some(&JOINTS_RAD[0]), ..Capture::new(&image, tip(&JOINTS_RAD[2])) };
     let id = store.add_capture(&wrong).expect("add");
-    assert!(matches!(store.document().tip_by_joint(), Err(PlacementError::Foreign { view: 5, .. })));
+    assert!(matches!(store.document().placement(), Err(PlacementError::Foreign { view: 5, .. })));
     store.apply(Edit::SetExcluded { ids: vec![id], excluded: true }).expect("exclude");
-    let reported = store.document().tip_by_joint().expect("the others belong together");
+    let reported = joints_of(store.document());
     assert_eq!(reported.into_keys().map(|id| id.0).collect::<Vec<_>>(), [1, 2, 3, 4]);
 }
 

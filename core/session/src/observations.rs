@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector6;
-
 use super::capture_id::CaptureId;
 use super::document::{Document, Role};
+use handeye_arm::Arm;
 use handeye_dataset::CameraInput;
-use handeye_estimate::placement::PlacementError;
+use handeye_estimate::placement::{Placement, PlacementError};
 use handeye_estimate::{Observations, ObservedView};
 use handeye_geometry::targets::observation::{Sight, View};
 
@@ -21,20 +20,33 @@ pub struct SessionObservations {
     pub captures: Vec<CaptureId>,
     /// What verifies: the captures kept for it that were not taken out and in which the target was found.
     pub verification: Vec<(CaptureId, View)>,
+    /// The arm, where the joint angles of the captures are used.
+    pub arm: Option<ArmOfViews>,
+}
+
+/// An arm and its joints in the views.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmOfViews {
+    /// Where the views put it.
+    pub arm: Arm,
+    /// Its joint values in each view, radians; `None` where a view has none.
+    pub joints_rad: Vec<Option<Vec<f64>>>,
 }
 
 impl Document {
     /// What was observed in the captures. `sights` gives what the image of a capture shows, `None` when the target was not found in it;
     /// `image_size` is width and height of the images in pixels.
     ///
-    /// Joint angles are used where they belong to the poses, see [`Document::tip_by_joint`]; otherwise a line in the log
+    /// Joint angles are used where they belong to the poses, see [`Document::placement`]; otherwise a line in the log
     /// says why not.
     pub fn observations(
         &self,
         image_size: (u32, u32),
         sights: impl Fn(CaptureId) -> Option<Sight>,
     ) -> SessionObservations {
-        let mut tip_by_joint = self.tip_by_joint_or_none();
+        let placement = self.placement_or_none();
+        let mut tip_from_joints =
+            placement.as_ref().map_or_else(BTreeMap::new, |placement| self.tip_from_joints(placement));
         let mut seen = SessionObservations {
             observations: Observations {
                 mode: self.mode(),
@@ -45,17 +57,21 @@ impl Document {
             },
             captures: Vec::new(),
             verification: Vec::new(),
+            arm: placement.map(|placement| ArmOfViews { arm: placement.arm, joints_rad: Vec::new() }),
         };
         for capture in &self.captures {
             let sight = sights(capture.id);
-            let tip_by_joint = tip_by_joint.remove(&capture.id).unwrap_or_default();
+            let tip_from_joints = tip_from_joints.remove(&capture.id).unwrap_or_default();
             match (capture.role, sight) {
                 (Role::Calibration, sight) => {
                     let depth = sight.as_ref().and_then(|sight| sight.depth);
                     let corners = sight.map(|sight| sight.corners);
                     seen.captures.push(capture.id);
+                    if let Some(arm) = &mut seen.arm {
+                        arm.joints_rad.push(capture.joints_rad.clone());
+                    }
                     seen.observations.views.push(ObservedView {
-                        tip_by_joint,
+                        tip_from_joints,
                         depth,
                         in_fit: capture.is_in_use(),
                         ..ObservedView::new(&capture.image, capture.base_from_tip, corners)
@@ -65,7 +81,7 @@ impl Document {
                     // A camera by itself is not verified.
                     let Some(base_from_tip) = capture.base_from_tip else { continue };
                     let view = View::new(capture.image.clone(), base_from_tip, corners);
-                    seen.verification.push((capture.id, View { tip_by_joint, depth, ..view }));
+                    seen.verification.push((capture.id, View { tip_from_joints, depth, ..view }));
                 }
                 (Role::Verification, _) => {}
             }
@@ -73,13 +89,13 @@ impl Document {
         seen
     }
 
-    fn tip_by_joint_or_none(&self) -> BTreeMap<CaptureId, Vec<Vector6<f64>>> {
-        self.tip_by_joint().unwrap_or_else(|why| {
+    fn placement_or_none(&self) -> Option<Placement> {
+        self.placement().unwrap_or_else(|why| {
             // Too few poses to tell where the arm stands are too few for an answer, which says so itself.
             if !matches!(why, PlacementError::NotPlaced(_)) {
                 tracing::warn!("the joint angles are not used: {why}");
             }
-            BTreeMap::new()
+            None
         })
     }
 }

@@ -92,11 +92,15 @@ impl Ur5 {
         self.frames(joints)[6]
     }
 
-    /// The twist of the tip per radian of each joint, in its own axes: every joint turns about z of the frame before it.
-    pub fn tip_by_joint(&self, joints: &[f64; 6]) -> [Vector6<f64>; 6] {
+    /// The frames whose z axes the joints turn about, in that of the tip: every joint turns about z of the frame before it.
+    pub fn tip_from_joints(&self, joints: &[f64; 6]) -> [Isometry3<f64>; 6] {
         let frames = self.frames(joints);
-        std::array::from_fn(|j| {
-            let tip_from_axis = frames[6].inverse() * frames[j];
+        std::array::from_fn(|j| frames[6].inverse() * frames[j])
+    }
+
+    /// The twist of the tip per radian of each joint, in its own axes.
+    pub fn tip_by_joint(&self, joints: &[f64; 6]) -> [Vector6<f64>; 6] {
+        self.tip_from_joints(joints).map(|tip_from_axis| {
             let turn = tip_from_axis.rotation * Vector3::z();
             let shift = tip_from_axis.translation.vector.cross(&turn);
             Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)

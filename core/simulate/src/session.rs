@@ -357,7 +357,7 @@ impl<'a> CameraAtWork<'a> {
     fn take(&mut self, index: usize, planned: &Isometry3<f64>) -> Option<(View, Pose<Camera, Target>)> {
         let Setup { links, fault, noise, .. } = self.setup;
         let reported = links.base_from_tip(&Pose::from_isometry(*planned));
-        let (off, tip_by_joint) = self.arm_off(&reported)?;
+        let (off, tip_from_joints) = self.arm_off(&reported)?;
         let mut tip = reported.isometry() * off * robot_error(&mut self.rng, noise);
         let moving = fault.moving.iter().find(|(view, _)| *view == index);
         if let Some((_, twist)) = moving {
@@ -375,12 +375,12 @@ impl<'a> CameraAtWork<'a> {
         let camera_from_target = links.camera_from_target(&Pose::from_isometry(tip));
         let noise_px = if moving.is_some() { 3.0 * noise.corner_px } else { noise.corner_px };
         let corners = self.corners(&camera_from_target, noise_px)?;
-        let view = View { tip_by_joint, ..View::new(format!("{index:03}"), reported, corners) };
+        let view = View { tip_from_joints, ..View::new(format!("{index:03}"), reported, corners) };
         Some((view, camera_from_target))
     }
 
-    /// What the arm is off by at a reported pose besides its noise, and how the tip moves with its joints where they are known.
-    fn arm_off(&mut self, reported: &Pose<Base, Tip>) -> Option<(Isometry3<f64>, Vec<Vector6<f64>>)> {
+    /// What the arm is off by at a reported pose besides its noise, and where its joints are at the tip where they are known.
+    fn arm_off(&mut self, reported: &Pose<Base, Tip>) -> Option<(Isometry3<f64>, Vec<Isometry3<f64>>)> {
         let Setup { joints: known, fault, arm_error, .. } = self.setup;
         let mut off = Isometry3::identity();
         if let ArmError::Affine(slopes) = arm_error {
@@ -406,7 +406,7 @@ impl<'a> CameraAtWork<'a> {
                 off *= really_off(&arm, &really);
             }
         }
-        Some((off, if *known { arm.tip_by_joint(&joints).to_vec() } else { Vec::new() }))
+        Some((off, if *known { arm.tip_from_joints(&joints).to_vec() } else { Vec::new() }))
     }
 
     fn corners(&mut self, camera_from_target: &Pose<Camera, Target>, noise_px: f64) -> Option<Vec<Corner>> {

@@ -123,10 +123,10 @@ pub fn faulty(fault: usize, times: f64, seed: u64) -> (Observations, FindingCode
 
 /// The views with the poses of other rows; views without one are left out.
 fn paired(mut session: Observations, rows: impl Iterator<Item = Option<usize>>) -> Observations {
-    let poses: Vec<_> = session.views.iter().map(|view| (view.base_from_tip, view.tip_by_joint.clone())).collect();
+    let poses: Vec<_> = session.views.iter().map(|view| (view.base_from_tip, view.tip_from_joints.clone())).collect();
     let views = session.views.into_iter().zip(rows).filter_map(|(view, row)| {
-        let (base_from_tip, tip_by_joint) = poses.get(row?)?.clone();
-        Some(ObservedView { base_from_tip, tip_by_joint, ..view })
+        let (base_from_tip, tip_from_joints) = poses.get(row?)?.clone();
+        Some(ObservedView { base_from_tip, tip_from_joints, ..view })
     });
     session.views = views.collect();
     session

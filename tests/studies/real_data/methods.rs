@@ -49,7 +49,7 @@ const VARIANTS: [(&str, Free); 5] = [
     ("joint, camera and warp free", Free { intrinsics: true, warp: true, ..FIXED }),
     ("joint, all three free", Free { intrinsics: true, warp: true, scale: true, ..FIXED }),
 ];
-const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, joints: false, field: false, depth: false };
+const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, arm: false, field: false, depth: false };
 
 /// Fewest views from which camera and warp are freed.
 const MANY: usize = 12;

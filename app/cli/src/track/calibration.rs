@@ -47,7 +47,6 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
         intrinsics,
         shape,
         print_errors_m: print.map_or_else(Vec::new, PrintEstimate::errors_m),
-        joint_offsets_rad: joint_offsets_rad(&result),
         field: result.estimate.as_ref().and_then(|estimate| Some(estimate.robot_field.as_ref()?.field())),
         hand_eye_covariance: covariance,
         small_sample: small_sample(&result),
@@ -66,13 +65,6 @@ fn small_sample(result: &CalibrationResult) -> SmallSample {
         scale: scale.unwrap_or(SmallSample::KNOWN.scale),
         ..SmallSample::KNOWN
     }
-}
-
-/// The offsets of the joints that the answer uses.
-fn joint_offsets_rad(result: &CalibrationResult) -> Vec<f64> {
-    let joints = result.estimate.as_ref().and_then(|estimate| estimate.joint_offsets.as_ref());
-    let accepted = joints.filter(|joints| joints.accepted);
-    accepted.map_or_else(Vec::new, |joints| joints.offsets_deg.iter().map(|deg| deg.to_radians()).collect())
 }
 
 fn links(result: &CalibrationResult) -> Option<(HandEye, Option<nalgebra::Matrix6<f64>>)> {

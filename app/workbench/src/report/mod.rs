@@ -5,8 +5,12 @@ mod page;
 
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_estimate::handeye::Mode;
+use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::resolution::{angle_text, place_text};
-use handeye_result::{CalibrationResult, EstimateDetails, MethodStatus, TransformEstimate, ViewRecordStatus};
+use handeye_result::{
+    ArmLevels, CalibrationResult, EstimateDetails, HeldOutByArm, JointErrorEstimate, MethodStatus, TransformEstimate,
+    ViewRecordStatus,
+};
 
 pub use markdown::markdown;
 pub use page::{of_session, page, shared_camera};
@@ -56,6 +60,7 @@ pub fn sections(solved: &Solved) -> Vec<Section> {
     );
     all.extend(camera(result));
     all.push(fit(result));
+    all.extend(arm(result));
     all.extend(truth(result));
     all.push(methods(result));
     all.push(views(result));
@@ -73,7 +78,7 @@ fn headline(result: &CalibrationResult) -> Section {
     };
     Section {
         title: title.to_owned(),
-        lines: expected_error(result).map(Line::Words).into_iter().collect(),
+        lines: expected_error(result).into_iter().chain(reach(result)).map(Line::Words).collect(),
         ..Section::default()
     }
 }
@@ -97,6 +102,16 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
         }
         None => stated,
     })
+}
+
+/// How near a tool arrives, where the arm is known.
+fn reach(result: &CalibrationResult) -> Option<String> {
+    let (plain, corrected) = result.quality.reach_error_95_mm.zip(result.quality.reach_error_corrected_95_mm)?;
+    Some(format!(
+        "a tool of {:.0} mm arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is, \
+         within {corrected:.3} mm with corrected commands (`handeye correct`)",
+        USUAL_TOOL_M * 1e3
+    ))
 }
 
 /// What was found moves the answer by and what remains of an error, in millimetres: they add up as they are printed.
@@ -175,6 +190,32 @@ fn fit(result: &CalibrationResult) -> Section {
     Section { title: title.to_owned(), summary, lines, name_width: 0 }
 }
 
+/// What is off about the arm, joint by joint.
+fn arm(result: &CalibrationResult) -> Option<Section> {
+    let arm = result.arm.as_ref()?;
+    let ArmLevels { angle_deg, length_mm, compliance_deg } = arm.levels;
+    let mut summary = vec![format!("typically {angle_deg:.4}° and {length_mm:.4} mm, compliance {compliance_deg:.4}°")];
+    if let Some(HeldOutByArm { reported, corrected }) = arm.heldout_px {
+        let verdict = if arm.contradicted { ": do not correct by them" } else { "" };
+        summary.push(format!("held-out error {reported:.4} → {corrected:.4} px by corrected poses{verdict}"));
+    }
+    let row = |joint: &JointErrorEstimate| {
+        let zero = joint.zero_deg.zip(joint.zero_sigma_deg).map(|(value, sigma)| ([value], [sigma]));
+        let zero = zero.map(|(values, sigmas)| with_sigma("zero", &values, &sigmas, "°"));
+        let tilt = joint.tilt_deg.zip(joint.tilt_sigma_deg).map(|(v, s)| with_sigma("axis", &v, &s, "°"));
+        let shift = joint.shift_mm.zip(joint.shift_sigma_mm).map(|(v, s)| with_sigma("place", &v, &s, " mm"));
+        let parts: Vec<String> = [zero, tilt, shift].into_iter().flatten().collect();
+        (!parts.is_empty()).then(|| Line::row(&joint.name, parts))
+    };
+    let lines = arm.joints.iter().filter_map(row).collect();
+    Some(Section { title: "errors of the arm".to_owned(), summary, lines, name_width: 12 })
+}
+
+fn with_sigma(what: &str, values: &[f64], sigmas: &[f64], unit: &str) -> String {
+    let each: Vec<_> = values.iter().zip(sigmas).map(|(value, sigma)| format!("{value:+.4} ± {sigma:.4}")).collect();
+    format!("{what} {}{unit}", each.join(", "))
+}
+
 /// What the joint estimate says of itself: only what there is to say.
 fn details(estimate: &EstimateDetails) -> Vec<String> {
     let mut out = Vec::new();
@@ -227,13 +268,6 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
     }
     if let Some(distortion) = &estimate.residual_distortion {
         out.push(format!("lens beyond its model: {:.4} px RMS over the corners", distortion.rms_px));
-    }
-    if let Some(joints) = &estimate.joint_offsets {
-        let each: Vec<String> =
-            joints.offsets_deg.iter().zip(&joints.sigma_deg).map(|(o, s)| format!("{o:.4} ± {s:.4}°")).collect();
-        let verdict = if joints.accepted { "taken" } else { "not taken" };
-        let (before, after) = (joints.heldout_before_px, joints.heldout_after_px);
-        out.push(format!("joint offsets {}: {verdict}, held-out error {before:.4} → {after:.4} px", each.join(", ")));
     }
     out
 }

@@ -19,7 +19,7 @@ const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
 /// The ten reference poses, so that they are there wherever the binary is.
 pub const REFERENCE_POSES: &str = include_str!("../../../../assets/poses/seed10.toml");
 
-/// The arm whose joint values the estimate of joint offsets may use: of any other the values are kept and not used.
+/// The arm whose joint values the estimate of the arm's errors may use: of any other the values are kept and not used.
 pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {
     kinematics.filter(|arm| arm.is_ur5()).map(|_ur5| BUILT_IN_ARM)
 }

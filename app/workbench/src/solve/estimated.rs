@@ -3,8 +3,10 @@
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_estimate::handeye::joint::PrintErrors;
+use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::verify::{DepthErrors, DepthReport};
-use handeye_estimate::{DepthsInFit, JointFit, JointOffsets, ShapeEstimate, ViewStatus};
+use handeye_estimate::{ArmFit, DepthsInFit, JointFit, ShapeEstimate, ViewStatus};
+use handeye_result::Quality;
 use handeye_wording::shown;
 
 use crate::text::Text;
@@ -27,8 +29,9 @@ pub struct EstimatedValue {
 }
 
 /// All of it, one line each; nothing is said of what is as usual.
-pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
+pub fn estimated(calibration: &Calibration, quality: &Quality, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
+    lines.extend(reach(quality));
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
     let depths = calibration.joint.as_ref().and_then(|joint| joint.depths.as_ref());
@@ -42,8 +45,27 @@ pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<
     lines.extend(view_noise(joint));
     lines.extend(widening(joint));
     lines.push(freedom(joint));
-    lines.extend(joint.joint_offsets.as_ref().map(joint_offsets));
+    lines.extend(joint.arm.as_ref().map(arm));
     lines
+}
+
+/// How near a tool arrives, where the arm is known.
+fn reach(quality: &Quality) -> Option<EstimatedValue> {
+    let (plain, corrected) = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm)?;
+    Some(EstimatedValue {
+        what: text!("A tool arrives within"),
+        value: text!(
+            "{plain} mm as the controller is, {corrected} mm with corrected commands",
+            plain = format!("{plain:.2}"),
+            corrected = format!("{corrected:.2}")
+        ),
+        meaning: text!(
+            "Distance between a point of the board that the camera saw and the tip of a tool of {tool} mm along z of the tip that is \
+             sent there; 95 % are below",
+            tool = format!("{:.0}", USUAL_TOOL_M * 1e3)
+        ),
+        why: None,
+    })
 }
 
 fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
@@ -195,30 +217,37 @@ fn freedom(joint: &JointFit) -> EstimatedValue {
     }
 }
 
-fn joint_offsets(offsets: &JointOffsets) -> EstimatedValue {
-    let each = offsets.offsets_rad.iter().zip(&offsets.sigma_rad).enumerate().map(|(index, (offset, sigma))| {
-        format!("{}: {:+.3} ± {:.3}°", index + 1, offset.to_degrees(), sigma.to_degrees())
+fn arm(arm: &ArmFit) -> EstimatedValue {
+    let noise = arm.noise;
+    let why = arm.heldout_px.map(|[reported, corrected]| {
+        let (before, after) = (format!("{reported:.3}"), format!("{corrected:.3}"));
+        if arm.contradicted {
+            text!(
+                "Do not correct by them: views left out are predicted to {after} px with them and {before} px without",
+                after = after,
+                before = before
+            )
+        } else {
+            text!(
+                "Views left out are predicted to {after} px by corrected poses instead of {before} px by reported ones",
+                after = after,
+                before = before
+            )
+        }
     });
-    let before = format!("{:.3}", offsets.heldout_before_px);
-    let after = format!("{:.3}", offsets.heldout_after_px);
-    let why = if offsets.accepted {
-        text!(
-            "The answer uses them: views left out are predicted to {after} px instead of {before} px",
-            after = after,
-            before = before
-        )
-    } else {
-        text!(
-            "The answer does not use them: views left out are predicted to {after} px with them and {before} px without",
-            after = after,
-            before = before
-        )
-    };
     EstimatedValue {
-        what: text!("Offsets of the joints"),
-        value: Text::verbatim(each.collect::<Vec<_>>().join(", ")),
-        meaning: text!("To be added to the angles that the robot reports, joint by joint; ± is one standard deviation"),
-        why: Some(why),
+        what: text!("Errors of the arm"),
+        value: text!(
+            "angles {angle}°, lengths {length} mm, compliance {compliance}°",
+            angle = format!("{:.3}", noise.link_rad.to_degrees()),
+            length = format!("{:.3}", noise.link_m * 1e3),
+            compliance = format!("{:.3}", noise.compliance_rad.to_degrees())
+        ),
+        meaning: text!(
+            "How far the links of this arm typically are from what its controller takes them to be, one standard deviation; \
+             handeye correct makes commands that allow for it. The answer above is for the controller as it is"
+        ),
+        why,
     }
 }
 
@@ -235,11 +264,11 @@ mod tests {
         let model = sample::solved();
         let mut calibration = model.solve.current().expect("solved").calibration.clone();
         let joint = calibration.joint.as_mut().expect("a joint estimate");
-        (joint.shape, joint.joint_offsets) = (None, None);
+        (joint.shape, joint.arm) = (None, None);
         joint.widening = Overdispersion { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() };
         joint.noise.view_px = 0.0;
         change(&mut calibration);
-        let lines = estimated(&calibration, None);
+        let lines = estimated(&calibration, &Quality::default(), None);
         lines
             .iter()
             .map(|it| (it.what.in_language(Language::English), it.value.in_language(Language::English)))
@@ -289,13 +318,6 @@ mod tests {
             joint.widening =
                 Overdispersion { factor: 4.0, by: Some(Evidence::Neighbours), lens: 1.0, checks: Vec::new() };
             joint.small_sample.degrees_of_freedom = f64::INFINITY;
-            joint.joint_offsets = Some(JointOffsets {
-                offsets_rad: vec![1.0_f64.to_radians(), (-0.5_f64).to_radians()],
-                sigma_rad: vec![0.01_f64.to_radians(); 2],
-                heldout_before_px: 0.5,
-                heldout_after_px: 0.3,
-                accepted: true,
-            });
         });
         for (what, value) in [
             ("Outlier views", "1 of 10"),
@@ -305,7 +327,6 @@ mod tests {
             ("Noise of views", "0.120 px"),
             ("Uncertainty widened", "2.0 times"),
             ("Distribution of the stated error", "normal"),
-            ("Offsets of the joints", "1: +1.000 ± 0.010°, 2: -0.500 ± 0.010°"),
         ] {
             assert!(has(&lines, what, value), "{what}: {value} in {lines:?}");
         }

@@ -136,7 +136,7 @@ pub(crate) fn is_asked(model: &Model, numbers: &Numbers) -> bool {
 }
 
 fn job(model: &Model, id: JobId, document: &Document) -> SolveJob {
-    let SessionObservations { observations, captures, verification } = seen(model, document);
+    let SessionObservations { observations, captures, verification, arm } = seen(model, document);
     SolveJob {
         id,
         observations,
@@ -145,6 +145,7 @@ fn job(model: &Model, id: JobId, document: &Document) -> SolveJob {
         method: Method::by_name(&model.method).unwrap_or_default(),
         options: Options { keep_outliers: model.keep_outliers, ..Options::default() },
         goal_m: model.view.goal.0,
+        arm,
         truth: model.cell.as_ref().and_then(|cell| cell.truth.clone()),
     }
 }

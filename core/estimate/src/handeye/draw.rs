@@ -18,6 +18,17 @@ impl Draw {
         z ^ (z >> 31)
     }
 
+    /// Evenly from 0 to 1, without either.
+    pub fn even(&mut self) -> f64 {
+        ((self.next() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+
+    /// Of a normal distribution of mean 0 and variance 1 (Box & Muller 1958).
+    pub fn normal(&mut self) -> f64 {
+        let (length, angle) = (self.even(), self.even());
+        (-2.0 * length.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
+    }
+
     /// A number below `bound`; the bias of the remainder is beneath one in 2⁵⁰ for any number of views.
     pub fn below(&mut self, bound: usize) -> usize {
         (self.next() % bound.max(1) as u64) as usize

@@ -30,9 +30,6 @@ pub struct Predictor {
     pub shape: BoardShape,
     /// What the points of the target are off their drawing, metres; empty where the calibration found nothing of the kind.
     pub print_errors_m: Vec<Vector2<f64>>,
-    /// Offsets of the joints that the calibration counts on, to be added to the reported angles, radians; empty where it
-    /// counts on none.
-    pub joint_offsets_rad: Vec<f64>,
     /// Errors of the robot that depend on where it stands, where the calibration found them.
     pub field: Option<PoseDependentError>,
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
@@ -67,7 +64,6 @@ impl Predictor {
             intrinsics,
             shape: BoardShape::default(),
             print_errors_m: Vec::new(),
-            joint_offsets_rad: Vec::new(),
             field: None,
             hand_eye_covariance: None,
             small_sample: SmallSample::KNOWN,
@@ -95,7 +91,6 @@ impl Predictor {
             free: joint.free,
             covariance: joint.covariance.clone(),
         });
-        let offsets = joint.and_then(|joint| joint.joint_offsets.as_ref()).filter(|offsets| offsets.accepted);
         Ok(Self {
             hand_eye,
             intrinsics,
@@ -103,7 +98,6 @@ impl Predictor {
             print_errors_m: joint
                 .and_then(|joint| joint.print.as_ref())
                 .map_or_else(Vec::new, |it| it.errors_m.clone()),
-            joint_offsets_rad: offsets.map_or_else(Vec::new, |offsets| offsets.offsets_rad.clone()),
             field: joint.and_then(|joint| joint.field.clone()),
             hand_eye_covariance: calibration.hand_eye_covariance().copied(),
             small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
@@ -117,20 +111,15 @@ impl Predictor {
         if drawn.len() == self.print_errors_m.len() { drawn.displaced(&self.print_errors_m) } else { drawn }
     }
 
-    /// Where the tip is when the robot reports what it does in this view: with the offsets of the joints and the robot's
-    /// field taken out.
+    /// Where the tip is when the robot reports what it does in this view: with the robot's field taken out.
     ///
     /// # Errors
-    /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] when there are offsets and the view does not say how its tip
-    /// moves with the joints.
+    /// [`VerifyError::NotFinite`].
     pub fn base_from_tip(&self, view: &View) -> Result<Pose<Base, Tip>, VerifyError> {
         if !view.base_from_tip.is_finite() {
             return Err(VerifyError::NotFinite { name: view.name.clone() });
         }
-        if view.tip_by_joint.len() < self.joint_offsets_rad.len() {
-            return Err(VerifyError::NoJoints { name: view.name.clone() });
-        }
-        Ok(corrected_base_from_tip(view, &self.joint_offsets_rad, self.field.as_ref()))
+        Ok(corrected_base_from_tip(view, None, self.field.as_ref()))
     }
 
     /// Where the camera is when the tip is there.

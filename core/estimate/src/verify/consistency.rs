@@ -2,7 +2,7 @@
 //!
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
 //! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and whatever of lens,
-//! target, joints and the robot's field is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP, with
+//! target, and the robot's field is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP, with
 //! `J` and the pose as seen weighed by what the detector states of each corner, as in the fit. With
 //! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
@@ -71,7 +71,7 @@ impl Sums {
     pub fn new(calibrated: &Predictor, uncertainty: &Uncertainty) -> Option<Self> {
         let form = uncertainty.free.form();
         let slopes = if calibrated.field.is_some() { SLOPES } else { 0 };
-        let n = LINKS + form.count(&calibrated.intrinsics) + calibrated.joint_offsets_rad.len() + slopes;
+        let n = LINKS + form.count(&calibrated.intrinsics) + slopes;
         if uncertainty.covariance.shape() != (n, n) {
             return None;
         }
@@ -98,10 +98,10 @@ impl Sums {
         view: &View,
         check: &CaptureCheck,
     ) -> Option<f64> {
-        let chain = Chain::with_joints(
+        let chain = Chain::with_arm(
             calibrated.hand_eye.mode(),
             view,
-            &calibrated.joint_offsets_rad,
+            None,
             &calibrated.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(&view.base_from_tip)),
             &calibrated.hand_eye.mount_from_camera(),
             &calibrated.hand_eye.anchor_from_target(),
@@ -112,15 +112,14 @@ impl Sums {
         let equations = PoseEquations::new(&seen_through, seen, self.form).ok()?;
         let pose_covariance = Cholesky::new(equations.pose)?.inverse();
         let by_form = pose_covariance * equations.pose_by_form;
-        let (form, joints) = (self.form.count(&calibrated.intrinsics), calibrated.joint_offsets_rad.len());
+        let form = self.form.count(&calibrated.intrinsics);
         let mut by_shared = DMatrix::zeros(6, self.covariance.nrows());
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
         by_shared.columns_mut(LINKS, form).copy_from(&by_form);
-        by_shared.columns_mut(LINKS + form, joints).copy_from(&chain.by_joints.columns(0, joints));
         if let Some(field) = &calibrated.field {
             let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
-            by_shared.columns_mut(LINKS + form + joints, SLOPES).copy_from(&columns);
+            by_shared.columns_mut(LINKS + form, SLOPES).copy_from(&columns);
         }
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
             + pose_covariance * resolution::pose_variance_px2(self.corner_variance, view.corners.len());

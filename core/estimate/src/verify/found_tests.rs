@@ -1,29 +1,21 @@
-//! Verification with what a calibration finds out beside the links: the size of the board and offsets of the joints; and
+//! Verification with what a calibration finds out beside the links, the size of the board; and
 //! the law of measured points.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3, Vector6};
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
+use nalgebra::Point3;
 
 use super::*;
 use crate::diagnose::findings::FindingOptions;
 use crate::diagnose::{Calibration, calibrate_with};
 use crate::handeye::joint::{Noise, SmallSample};
 use crate::handeye::{HandEye, Mode};
-use crate::{CameraKnowledge, Method, Observations, ObservedView, Options};
-use handeye_arm::{ArmKind, ArmModel};
-use handeye_geometry::camera::Intrinsics;
+use crate::{Method, Observations, Options};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::testing::BOARD;
-use handeye_simulate::links::noise_twist;
-use handeye_simulate::session::{REALISTIC, Session, camera, seen, trial};
+use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 
 /// A print that is so much larger than stated, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
-/// What the joints of the simulated arm are off by, degrees; the first and the last joint cannot be told.
-const OFFSETS_DEG: [f64; 6] = [0.0, 0.2, -0.15, 0.1, -0.2, 0.0];
-
 const EXACT: Noise = Noise { corner_px: 0.0, robot_m: 0.0, robot_rad: 0.0, ..Noise::EXACT };
 
 fn check_all(calibrated: &Predictor, views: &[View]) -> Verification {
@@ -78,64 +70,6 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
         let truth = t.true_camera_from_target[0].isometry() * board.point(corner.index, &exact.shape);
         assert!((found.in_camera.point() - truth).norm() < 1e-8, "{} {truth}", found.in_camera.point());
     }
-}
-
-/// Views of a UR5 whose joints stand a little elsewhere than it reports, with the board half a metre in front of it.
-fn views_of_an_arm_with_offsets(count: usize, noise: &Noise, intrinsics: &Intrinsics, seed: u64) -> Vec<View> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let arm = ArmModel::Kind(ArmKind::Ur5).arm().expect("built in");
-    let tip_from_camera: Pose<Tip, Camera> =
-        Pose::from_isometry(se3::exp(&Vector6::new(0.05, 0.01, 0.06, 0.1, -0.05, 0.4)));
-    let middle = [0.3, -1.4, 1.6, -1.7, -1.5, 0.2];
-    let standing = arm.forward(&middle).expect("six joints") * tip_from_camera;
-    let centre = BOARD.centre();
-    let ahead =
-        Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.5).into(), UnitQuaternion::from_euler_angles(0.2, -0.1, 0.1))
-            * Isometry3::translation(-centre.x, -centre.y, -centre.z);
-    let base_from_target: Pose<Base, Target> = standing * Pose::from_isometry(ahead);
-    let mut views = Vec::new();
-    while views.len() < count {
-        // Wrist and arm turn, so that the offsets of the four joints between are told.
-        let reported: Vec<f64> =
-            (0..6).map(|j| middle[j] + rng.random_range(-1.0..1.0) * if j == 5 { 0.9 } else { 0.35 }).collect();
-        let really: Vec<f64> = reported.iter().zip(OFFSETS_DEG).map(|(q, deg)| q + deg.to_radians()).collect();
-        let camera_from_target =
-            (arm.forward(&really).expect("six joints") * tip_from_camera).inverse() * base_from_target;
-        let corners =
-            seen(&mut rng, intrinsics, camera_from_target.isometry(), &BOARD.points(), noise.corner_px, |_| {
-                Vector2::zeros()
-            });
-        let error = noise_twist(&mut rng, noise.robot_m, noise.robot_rad);
-        let base_from_tip = arm.forward(&reported).expect("six joints").perturbed(&error);
-        let tip_by_joint = arm.tip_by_joint_at(&base_from_tip, &reported).expect("six joints");
-        if let Some(corners) = corners {
-            views.push(View { tip_by_joint, ..View::new(views.len().to_string(), base_from_tip, corners) });
-        }
-    }
-    views
-}
-
-fn observed(views: &[View], intrinsics: Intrinsics) -> Observations {
-    Observations {
-        mode: Some(Mode::EyeInHand),
-        target: BOARD,
-        image_size: (intrinsics.width, intrinsics.height),
-        camera: CameraKnowledge::Fixed(intrinsics),
-        views: views.iter().map(ObservedView::from).collect(),
-    }
-}
-
-#[test]
-fn a_capture_whose_joints_are_unknown_is_not_verified_as_if_they_were_right() {
-    let mut views = views_of_an_arm_with_offsets(12, &EXACT, &camera(), 83);
-    let observations = observed(&views, camera());
-    let calibration = solved(&observations, Options { joint_offsets: true, ..Options::default() });
-    let calibrated = Predictor::new(&calibration).expect("complete");
-    assert_eq!(calibrated.joint_offsets_rad.len(), 6);
-    views[1].tip_by_joint.clear();
-    let captures: Vec<_> = views.iter().collect();
-    let result = verify(&calibrated, &BOARD, &captures, &CancelToken::default());
-    assert_eq!(result, Err(VerifyError::NoJoints { name: "1".to_owned() }));
 }
 
 #[test]
@@ -195,36 +129,5 @@ mod slow {
         assert!(stated >= 17, "{stated}");
         // A robot of 0.1 mm and 0.02°, which at half a metre is 0.17 mm, and an image of 0.1 px.
         assert!(centre_m < 0.5e-3, "{centre_m}");
-    }
-
-    #[test]
-    fn accepted_joint_offsets_are_part_of_the_prediction() {
-        let (mut mean, mut centre_m, mut without_m) = (0.0, 0.0, 0.0);
-        for seed in 0..10 {
-            let views = views_of_an_arm_with_offsets(40, &REALISTIC, &camera(), 8200 + seed);
-            let observations = observed(&views[..30], camera());
-            let calibration = solved(&observations, Options { joint_offsets: true, ..Options::default() });
-            assert!(
-                calibration
-                    .joint
-                    .as_ref()
-                    .and_then(|joint| joint.joint_offsets.as_ref())
-                    .is_some_and(|offsets| offsets.accepted),
-                "seed {seed}"
-            );
-            let calibrated = Predictor::new(&calibration).expect("complete");
-            let v = check_all(&calibrated, &views[30..]);
-            mean += v.consistency.expect("stated").ratio / 10.0;
-            centre_m += v.centre_rms_m / 10.0;
-            let forgotten = Predictor { joint_offsets_rad: Vec::new(), uncertainty: None, ..calibrated };
-            without_m += check_all(&forgotten, &views[30..]).centre_rms_m / 10.0;
-        }
-        println!(
-            "offsets {OFFSETS_DEG:?}°: middle {:.3} mm, ratio {mean:.3}; without them {:.3} mm",
-            centre_m * 1e3,
-            without_m * 1e3
-        );
-        assert!((0.75..1.3).contains(&mean), "{mean}");
-        assert!(centre_m < 0.5e-3 && without_m > 1e-3, "{centre_m} {without_m}");
     }
 }

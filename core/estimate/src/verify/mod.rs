@@ -56,15 +56,6 @@ pub enum VerifyError {
         /// Which capture.
         name: String,
     },
-    /// The calibration counts on offsets of the joints, and nothing says how this capture's tip moves with them.
-    #[error(
-        "the calibration corrects the robot's joints, and capture {name:?} does not say how they stood: capture it with \
-         its joint angles, or calibrate without joint offsets"
-    )]
-    NoJoints {
-        /// Which capture.
-        name: String,
-    },
     /// The chain predicts the board where the camera cannot see it, although it did.
     #[error(
         "the calibration predicts the board of capture {name:?} behind the camera: the calibration is of another set-up, \

@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Vector2, Vector6};
+use nalgebra::{Isometry3, Matrix2, Vector2, Vector3, Vector6};
 
 use crate::frames::{Base, Pose, Tip};
 use crate::targets::TargetSpec;
@@ -139,9 +139,9 @@ pub struct View {
     pub base_from_tip: Pose<Base, Tip>,
     /// The target points found; empty when the target was not found.
     pub corners: Corners,
-    /// How the tip turns with each joint: entry `j` is the twist `[t; r]` per radian with which joint `j` perturbs
-    /// `base_from_tip` on the right, metres and radians. Empty where the joint angles or the arm are not known.
-    pub tip_by_joint: Vec<Vector6<f64>>,
+    /// The joints of the arm at the reported pose: entry `j` is a frame at rest whose z axis joint `j` turns about, in that of
+    /// the tip. Empty where the joint angles or the arm are not known.
+    pub tip_from_joints: Vec<Isometry3<f64>>,
     /// The plane of the target by the depths of the image; `None` where none were measured.
     pub depth: Option<DepthPlane>,
 }
@@ -149,8 +149,16 @@ pub struct View {
 impl View {
     /// A view of a robot whose joints are not known.
     pub fn new(name: String, base_from_tip: Pose<Base, Tip>, corners: impl Into<Corners>) -> Self {
-        Self { name, base_from_tip, corners: corners.into(), tip_by_joint: Vec::new(), depth: None }
+        Self { name, base_from_tip, corners: corners.into(), tip_from_joints: Vec::new(), depth: None }
     }
+}
+
+/// How the tip turns with a joint, whose z axis it turns about: the twist `[t; r]` per radian with which it perturbs
+/// `base_from_tip` on the right, metres and radians.
+pub fn tip_by_joint(tip_from_joint: &Isometry3<f64>) -> Vector6<f64> {
+    let turn = tip_from_joint.rotation * Vector3::z();
+    let shift = tip_from_joint.translation.vector.cross(&turn);
+    Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
 /// Numbers what an image shows of a target from another corner, so many of its [quarter turns](TargetSpec::quarter_turns) away; the

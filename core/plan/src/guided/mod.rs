@@ -11,8 +11,8 @@
 //! a small estimate prefers estimates that happen to be small.
 //!
 //! # Degenerate cases
-//! A session whose views determine nothing goes on with the fan. Joint offsets of the robot, where they are estimated, are
-//! not among what a view is expected to tell.
+//! A session whose views determine nothing goes on with the fan. Errors of the robot's arm are not
+//! among what a view is expected to tell.
 
 pub mod by_hand;
 pub mod candidates;

@@ -33,7 +33,6 @@ def calibrate(
     method: str = "joint",
     keep_outliers: bool = False,
     free_scale: bool = False,
-    joint_offsets: bool = False,
     goal_mm: Optional[float] = None,
     progress: Optional[Progress] = None,
 ) -> Calibration:
@@ -78,8 +77,6 @@ def calibrate(
         Keep views and corners that do not fit the others; otherwise they are left out, named in `views` and `findings`.
     free_scale
         Estimate the true size of the target, or with pose pairs the unit of their translations.
-    joint_offsets
-        Try constant offsets of the robot's joints: for a data set with joint angles and the arm.
     goal_mm
         The expected error to reach, millimetres; a finding says whether it is.
     progress
@@ -103,7 +100,7 @@ def calibrate(
         lens_model, mode, names,
     )
     return Calibration._of(
-        *_handeye.calibrate(observations, method, keep_outliers, free_scale, joint_offsets, goal_mm, progress)
+        *_handeye.calibrate(observations, method, keep_outliers, free_scale, goal_mm, progress)
     )
 
 

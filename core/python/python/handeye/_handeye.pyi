@@ -19,7 +19,6 @@ def calibrate(
     method: str,
     keep_outliers: bool,
     free_scale: bool,
-    joint_offsets: bool,
     goal_mm: Optional[float],
     progress: Optional[Callable[[str, float], Any]],
 ) -> Tuple[str, Optional[Tuple[float, float]]]: ...

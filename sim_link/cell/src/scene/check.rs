@@ -149,7 +149,7 @@ fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
             return violation(&format!("robot.start_joints_deg[{i}]"), &start, need);
         }
         if let Some(offset) = joint_offset_deg {
-            // An estimate of joint offsets knows angles alone, and so do the faults of a cell.
+            // An estimate of an arm's errors knows angles alone, and so do the faults of a cell.
             let most = if joint.kind == JointKind::Revolute { 10.0 } else { 0.0 };
             in_range(&format!("robot.joint_offset_deg[{i}]"), offset[i], -most, most)?;
         }

@@ -8,7 +8,6 @@ mod board;
 mod client_faults;
 #[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod drivers;
-mod joint_offsets;
 mod other_arms;
 mod robots;
 mod surroundings;

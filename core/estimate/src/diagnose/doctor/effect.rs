@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector6};
 
 use super::model::Model;
+use handeye_geometry::targets::observation::tip_by_joint;
 
 /// A hypothesis that one change explains many views.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +76,7 @@ impl Effect {
             Self::BoardMoved(from) => square(&nalgebra::Matrix6::identity(), view >= from),
             Self::CameraMoved(from) => square(&row.by_hand_eye, view >= from),
             Self::Joint(joint) => {
-                let twist = seen.tip_by_joint.get(joint).copied().unwrap_or_default();
+                let twist = seen.tip_from_joints.get(joint).map_or_else(Vector6::zeros, tip_by_joint);
                 let turned = row.by_robot * twist;
                 DMatrix::from_iterator(6, 1, turned.iter().copied())
             }

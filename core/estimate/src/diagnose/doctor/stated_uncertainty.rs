@@ -16,8 +16,7 @@ use handeye_geometry::se3;
 
 /// What may be stated for a calibration beside what was judged.
 ///
-/// The linear model is fitted with what the calibration counts on already (a bent board, a size, joint offsets, outlier
-/// views) and with the accepted hypotheses besides; from the answer to that fit the hand-eye transform moves by what the
+/// The linear model is fitted with what the calibration counts on already (a bent board, a size, outlier views) and with the accepted hypotheses besides; from the answer to that fit the hand-eye transform moves by what the
 /// calibration misses. A fit of the linear model without the hypotheses is not the answer: where the model is wrong, pose by
 /// pose and all corners together are wrong in different ways. Explanations that are as good as the first are alternatives of
 /// their own.
@@ -103,8 +102,7 @@ fn counts_on(calibration: &estimate::Fit, effect: Effect) -> bool {
     match effect {
         Effect::Warp => joint.free.warp,
         Effect::Scale => joint.free.scale,
-        Effect::Joint(_) => joint.joint_offsets.as_ref().is_some_and(|offsets| offsets.accepted),
-        Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
+        Effect::Joint(_) | Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
     }
 }
 
@@ -113,7 +111,6 @@ pub(super) fn is_applied(calibration: &estimate::Fit, hypothesis: &Hypothesis) -
     match hypothesis.code {
         FindingCode::BoardBent => counts_on(calibration, Effect::Warp),
         FindingCode::WrongScale => counts_on(calibration, Effect::Scale),
-        FindingCode::JointOffset => counts_on(calibration, Effect::Joint(0)),
         FindingCode::OutlierView => hypothesis.views.iter().all(|name| is_out(calibration, name)),
         _ => false,
     }

@@ -1,6 +1,6 @@
 //! What the images alone say: the target's pose in every view, how precisely, and how lens and target shape turn it.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3};
 
 use crate::diagnose::hypotheses::SeenTarget;
 use crate::handeye::joint::CornerWeights;
@@ -57,7 +57,7 @@ pub struct SessionView {
     pub covariance: Matrix6<f64>,
     /// How the measured pose turns with lens (then warp x, y): the measured pose is off by minus this.
     pub(crate) by_form: DMatrix<f64>,
-    pub(crate) tip_by_joint: Vec<Vector6<f64>>,
+    pub(crate) tip_from_joints: Vec<Isometry3<f64>>,
     /// Corners that do not belong where they are, by their index in the target.
     pub(crate) wrong_corners: Vec<usize>,
     pub(crate) corners: usize,
@@ -104,7 +104,7 @@ struct Fit {
 impl SessionViews {
     /// Joints that are known in every view.
     pub fn joints(&self) -> usize {
-        self.views.iter().map(|v| v.tip_by_joint.len()).min().unwrap_or(0)
+        self.views.iter().map(|v| v.tip_from_joints.len()).min().unwrap_or(0)
     }
 
     /// Looks at all views in the fit that have a robot pose and the target. `lens` is the camera as the corners alone show it,
@@ -164,7 +164,7 @@ impl SessionViews {
                 alternative: None,
                 covariance: Matrix6::zeros(),
                 by_form: DMatrix::zeros(6, 0),
-                tip_by_joint: view.tip_by_joint.clone(),
+                tip_from_joints: view.tip_from_joints.clone(),
                 wrong_corners: Vec::new(),
                 corners: 0,
             });
@@ -227,7 +227,7 @@ impl SessionViews {
                 alternative: possible.map(|a| *a.camera_from_target.isometry()),
                 covariance: inverse * resolution::pose_variance_px2(variance, fit.corners.len()),
                 by_form: DMatrix::from_iterator(6, count, by_form.iter().copied()),
-                tip_by_joint: view.tip_by_joint.clone(),
+                tip_from_joints: view.tip_from_joints.clone(),
                 wrong_corners: fit.wrong,
                 corners: view.corners.as_ref().map_or(0, |corners| corners.len()),
             });

@@ -42,7 +42,7 @@ impl<'a> ExpectedPixels<'a> {
         let mut by_shared = Matrix6xX::zeros(layout.count());
         by_shared.fixed_columns_mut::<6>(0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_columns_mut::<6>(6).copy_from(&Matrix6::identity());
-        by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&chain.by_joints.columns(0, layout.joints));
+        by_shared.columns_mut(layout.arm_at(), chain.by_arm.ncols()).copy_from(&chain.by_arm);
         if let Some((field, base_from_tip)) = at {
             let slopes = pose_dependent_error::columns(&field.place(base_from_tip), &chain.by_correction);
             by_shared.columns_mut(layout.field_at(), layout.field).copy_from(&slopes);

@@ -9,6 +9,7 @@
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector2, Vector6};
 
+use super::arm_errors::KINDS;
 use super::chain::Chain;
 use super::expected_pixels::ExpectedPixels;
 use super::pose_dependent_error::{HALF, PoseDependentError, SLOPES};
@@ -28,7 +29,6 @@ const NO_PIVOT: f64 = 1e-12;
 
 /// The model that a calibration ended with: what its views share, and how noisy they are.
 ///
-/// Offsets of joints are left out: where they were estimated the links are taken as they are with them.
 #[derive(Debug, Clone)]
 pub struct ViewModel {
     hand_eye: HandEye,
@@ -53,10 +53,13 @@ impl ViewModel {
     pub fn new(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let joint = calibration.joint.as_ref()?;
         let intrinsics = calibration.intrinsics()?;
-        let free = Free { joints: false, depth: false, ..joint.free };
+        let free = Free { arm: false, depth: false, ..joint.free };
         let field = joint.field.clone();
-        let layout =
-            Layout { form: free.form().count(&intrinsics), joints: 0, field: field.as_ref().map_or(0, |_| SLOPES) };
+        let layout = Layout {
+            form: free.form().count(&intrinsics),
+            field: field.as_ref().map_or(0, |_| SLOPES),
+            arm: [0; KINDS],
+        };
         Some(Self {
             hand_eye: calibration.hand_eye?,
             intrinsics,
@@ -78,7 +81,7 @@ impl ViewModel {
         target: &TargetSpec,
     ) -> Self {
         let free = Free { intrinsics: free_lens, ..Free::default() };
-        let layout = Layout { form: free.form().count(&intrinsics), joints: 0, field: 0 };
+        let layout = Layout { form: free.form().count(&intrinsics), field: 0, arm: [0; KINDS] };
         let board = BoardPoints::new(&target.points());
         Self { hand_eye, intrinsics, free, noise, board, shape: BoardShape::default(), field: None, layout }
     }
@@ -156,7 +159,7 @@ impl ViewModel {
         let by_field = self.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(base_from_tip));
         let view = View::new(String::new(), *base_from_tip, Vec::new());
         let (mount, anchor) = (self.hand_eye.mount_from_camera(), self.hand_eye.anchor_from_target());
-        Chain::with_joints(self.mode(), &view, &[], &by_field, &mount, &anchor)
+        Chain::with_arm(self.mode(), &view, None, &by_field, &mount, &anchor)
     }
 
     /// Where the target is in a view from a reported tip pose.

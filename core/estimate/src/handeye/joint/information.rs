@@ -15,15 +15,19 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::Noise;
 use super::normal::System;
-use super::pose_dependent_error::HALF;
-use super::variance::{Levels, Likelihood};
+use super::variance::{EFFECTS_AT, LEVELS, LevelMatrix, Levels, Likelihood, levels_of_effects};
 use super::view_block::{Layout, PixelWeights, prior_weight};
 
+/// The level of the poses' part.
+const POSES: usize = 3;
+
 /// Levels that are told by something else than the poses' part.
-const OTHERS: [usize; 5] = [0, 1, 2, 4, 5];
+fn others() -> impl Iterator<Item = usize> {
+    (0..LEVELS).filter(|k| *k != POSES)
+}
 
 /// Fisher's information of the log-variances at these levels; zero for a level that is not estimated.
-pub fn information(system: &System, noise: &Noise, at: &Likelihood, levels: Levels) -> Matrix6<f64> {
+pub fn information(system: &System, noise: &Noise, at: &Likelihood, levels: Levels) -> LevelMatrix {
     let shared = &at.covariance;
     let mut traces = of_robot(system, noise, at);
     let prior = prior_weight(noise);
@@ -40,33 +44,29 @@ pub fn information(system: &System, noise: &Noise, at: &Likelihood, levels: Leve
     for k in 0..2 {
         traces[(0, 1 + k)] = by_form.dot(&(&at.moments[k] * &through)) * prior[3 * k];
     }
-    if levels.field {
-        let half = |k: usize| {
-            let first = system.layout.field_at() + k * HALF;
-            first..first + HALF
+    let effects = system.layout.effects();
+    let sigma = levels_of_effects(noise);
+    let by_form = by_form.into_owned();
+    for (k, places) in effects.iter().enumerate().filter(|(_, places)| !places.is_empty()) {
+        let through_kind = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
+            places.clone().map(|i| left.row(i).dot(&right.row(i))).sum::<f64>() / sigma[k].powi(2)
         };
-        let sigma = [noise.field_m, noise.field_rad];
-        for k in 0..2 {
-            let through_half = |left: &DMatrix<f64>, right: &DMatrix<f64>| {
-                half(k).map(|i| left.row(i).dot(&right.row(i))).sum::<f64>() / sigma[k].powi(2)
-            };
-            traces[(0, 4 + k)] = through_half(&through, &by_form.into_owned());
-            for of_robot in 0..2 {
-                traces[(1 + of_robot, 4 + k)] = through_half(&carried[of_robot], shared);
-            }
-            for l in k..2 {
-                let pairs = half(k).flat_map(|i| half(l).map(move |j| (i, j)));
-                let left = pairs.map(|(i, j)| f64::from(i == j) - shared[(i, j)] / (sigma[k] * sigma[l]));
-                traces[(4 + k, 4 + l)] = left.map(|entry| entry * entry).sum();
-            }
+        traces[(0, EFFECTS_AT + k)] = through_kind(&through, &by_form);
+        for of_robot in 0..2 {
+            traces[(1 + of_robot, EFFECTS_AT + k)] = through_kind(&carried[of_robot], shared);
+        }
+        for (l, others) in effects.iter().enumerate().skip(k) {
+            let pairs = places.clone().flat_map(|i| others.clone().map(move |j| (i, j)));
+            let left = pairs.map(|(i, j)| f64::from(i == j) - shared[(i, j)] / (sigma[k] * sigma[l]));
+            traces[(EFFECTS_AT + k, EFFECTS_AT + l)] = left.map(|entry| entry * entry).sum();
         }
     }
     traces.fill_lower_triangle_with_upper_triangle();
-    for k in OTHERS {
-        traces[(k, 3)] = at.counts[k] - OTHERS.iter().map(|&l| traces[(k, l)]).sum::<f64>();
-        traces[(3, k)] = traces[(k, 3)];
+    for k in others() {
+        traces[(k, POSES)] = at.counts[k] - others().map(|l| traces[(k, l)]).sum::<f64>();
+        traces[(POSES, k)] = traces[(k, POSES)];
     }
-    traces[(3, 3)] = at.counts[3] - OTHERS.iter().map(|&k| traces[(k, 3)]).sum::<f64>();
+    traces[(POSES, POSES)] = at.counts[POSES] - others().map(|k| traces[(k, POSES)]).sum::<f64>();
     levels.folded_matrix(&traces) * 0.5
 }
 
@@ -76,11 +76,11 @@ fn trace_of_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
 
 /// Traces of position and orientation of the corrections without what two corrections have in common through the shared
 /// unknowns, at the levels' places.
-fn of_robot(system: &System, noise: &Noise, at: &Likelihood) -> Matrix6<f64> {
+fn of_robot(system: &System, noise: &Noise, at: &Likelihood) -> LevelMatrix {
     let sigma = prior_weight(noise).map(|weight| weight.sqrt().recip());
     let (to, from) = (Matrix6::from_diagonal(&sigma.map(f64::recip)), Matrix6::from_diagonal(&sigma));
     let weight = PixelWeights::new(noise).pose;
-    let mut out = Matrix6::zeros();
+    let mut out = LevelMatrix::zeros();
     for (block, own) in system.blocks.iter().zip(&at.reduced.own) {
         // 1 − O⁻¹ in terms of the levels, without the difference of what is nearly equal.
         let seen = to * own.factor.solve(&(block.own * weight)) * from;

@@ -7,7 +7,7 @@ use crate::handeye::joint::variance::{evaluate, to_logs};
 use crate::handeye::joint::{JointProblem, Noise};
 use crate::test_sessions::Estimated as _;
 use handeye_geometry::progress::CancelToken;
-use handeye_simulate::session::{camera, trial};
+use handeye_simulate::session::{Setup, session};
 
 /// The count of a level is `θ_k tr(P V_k)`, so its derivative by the log of another variance is minus twice the information.
 #[test]
@@ -16,13 +16,24 @@ fn counts_change_with_the_levels_as_the_information_says() {
         view_px: 0.2,
         field_m: 8e-4,
         field_rad: 2e-3,
+        link_rad: 1e-3,
+        link_m: 3e-4,
+        compliance_rad: 8e-4,
         ..Noise { corner_px: 0.15, robot_m: 3e-4, robot_rad: 5e-4, ..Noise::EXACT }
     };
-    for levels in [Levels { view: true, field: true }, Levels { view: false, field: false }] {
-        let t = trial(Mode::EyeInHand, 12, &noise, camera(), 7);
-        let noise = if levels.view { noise } else { Noise { view_px: 0.0, field_m: 0.0, field_rad: 0.0, ..noise } };
+    let nothing = Levels { view: false, field: false, arm: false };
+    for levels in [Levels { view: true, field: true, arm: true }, Levels { arm: true, ..nothing }, nothing] {
+        let t = session(&Setup { joints: true, noise, ..Setup::new(Mode::EyeInHand, 12, 7) });
+        let mut noise = noise;
+        if !levels.field {
+            (noise.view_px, noise.field_m, noise.field_rad) = (0.0, 0.0, 0.0);
+        }
+        if !levels.arm {
+            (noise.link_rad, noise.link_m, noise.compliance_rad) = (0.0, 0.0, 0.0);
+        }
         let plain = t.problem(true, Some(noise));
-        let problem = JointProblem { free: Free { field: levels.field, warp: true, ..plain.free }, ..plain };
+        let problem =
+            JointProblem { free: Free { field: levels.field, arm: levels.arm, warp: true, ..plain.free }, ..plain };
         let mut state = State::new(&problem, &t.start());
         let cancel = CancelToken::default();
         let start = System::new(&problem, &state, &cancel).expect("regular");

@@ -26,7 +26,7 @@ use statrs::function::gamma::gamma_lr;
 
 use super::Noise;
 use super::normal::{self, System};
-use super::variance::{self, Aim, Levels, Likelihood, Logs, MostLikely};
+use super::variance::{self, Aim, LevelMatrix, Levels, Likelihood, Logs, MostLikely};
 use crate::handeye::{HandEyeError, determined};
 use handeye_geometry::point_error;
 
@@ -95,7 +95,7 @@ pub fn integrate(
     let start = variance::lifted(system, noise, levels)?;
     let found = variance::most_likely(system, start, levels, Aim::Posterior, TOP)?;
     let axes = Axes::new(&found.information(system, levels, Aim::Posterior), levels);
-    let level_sigma = |logs: &Matrix6<f64>| [0, 1, 2].map(|k| 0.5 * logs[(k, k)].max(0.0).sqrt());
+    let level_sigma = |logs: &LevelMatrix| [0, 1, 2].map(|k| 0.5 * logs[(k, k)].max(0.0).sqrt());
     if system.blocks.len() > MANY_VIEWS {
         let level_sigma = level_sigma(&axes.covariance());
         let around = |k: usize| [-1.96, 1.96].map(|times: f64| (0.5 * found.logs[k] + times * level_sigma[k]).exp());
@@ -132,7 +132,7 @@ struct Axes {
 }
 
 impl Axes {
-    fn new(information: &Matrix6<f64>, levels: Levels) -> Self {
+    fn new(information: &LevelMatrix, levels: Levels) -> Self {
         let places: Vec<usize> = levels.estimated().collect();
         let n = places.len();
         let information = DMatrix::from_fn(n, n, |i, j| information[(places[i], places[j])]);
@@ -142,9 +142,9 @@ impl Axes {
         Self { places, columns: &eigen.eigenvectors * DMatrix::from_diagonal(&width), widths: vec![[1.0; 2]; n] }
     }
 
-    fn covariance(&self) -> Matrix6<f64> {
+    fn covariance(&self) -> LevelMatrix {
         let within = &self.columns * self.columns.transpose();
-        let mut out = Matrix6::zeros();
+        let mut out = LevelMatrix::zeros();
         for (i, &k) in self.places.iter().enumerate() {
             for (j, &l) in self.places.iter().enumerate() {
                 out[(k, l)] = within[(i, j)];
@@ -229,7 +229,7 @@ fn golden_ratio(dimensions: usize) -> f64 {
 }
 
 /// Covariance of the log-variances.
-fn scatter(points: &[Point]) -> Matrix6<f64> {
+fn scatter(points: &[Point]) -> LevelMatrix {
     let mean: Logs = points.iter().map(|point| point.logs * point.weight).sum();
     points.iter().map(|point| (point.logs - mean) * (point.logs - mean).transpose() * point.weight).sum()
 }

@@ -2,7 +2,7 @@
 //!
 //! # What it estimates
 //! `mount_from_camera` and `anchor_from_target` (see [`super`]), a correction of every reported robot pose and, as far as
-//! they are [`Free`], the intrinsics, the shape of the target and the offsets of the robot's joints; with them the noise
+//! they are [`Free`], the intrinsics, the shape of the target and the errors of the robot's arm; with them the noise
 //! levels that weigh corners against robot poses.
 //!
 //! # Model
@@ -24,6 +24,7 @@
 //! inter-block information when block sizes are unequal" (REML); Ulrich & Hillemann 2024, "Uncertainty-aware hand-eye
 //! calibration" (robot poses as observations).
 
+pub(crate) mod arm_errors;
 pub(crate) mod chain;
 mod curvature;
 pub(crate) mod effects;
@@ -68,7 +69,8 @@ use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::{CancelToken, Stage, Work};
 use handeye_geometry::targets::observation::Corner;
 
-pub use chain::{MAX_JOINTS, base_from_tip_by_joints, camera_from_target, correction_transform};
+pub use arm_errors::{ArmErrors, ArmParameter, LEVELS_OF_ARMS, LinkError, TrueTip, arm_parameters};
+pub use chain::{camera_from_target, correction_transform};
 pub use expected_pixels::ExpectedPixels;
 pub use expected_view::{ExpectedView, ViewModel};
 pub use integrated::SmallSample;
@@ -81,9 +83,6 @@ use optimise::Descent;
 use state::State;
 use variance::{Levels, Logs, to_logs};
 
-/// Standard deviation of a joint's offset before any data: a robot that is a degree off is a broken one, and without a
-/// prior the offsets of the first and the last joint could not be told from the links.
-pub const JOINT_PRIOR_RAD: f64 = 0.02;
 /// Rounds of weights and optimum at the most.
 const MAX_ROUNDS: usize = 20;
 /// Relative change of every noise level below which the rounds end: a thousandth moves the answer by far less than its
@@ -122,7 +121,8 @@ pub(crate) fn fit<'a>(
     }
     let mut state = State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));
-    let mut levels = Levels { view: problem.view_noise == Some(true), field: state.field.is_some() };
+    let mut levels =
+        Levels { view: problem.view_noise == Some(true), field: state.field.is_some(), arm: state.arm.is_some() };
     if problem.noise.is_none() {
         // Whether the corners of a view share noise is decided by these views alone, not by where the fit began.
         if !levels.view {
@@ -130,6 +130,9 @@ pub(crate) fn fit<'a>(
         }
         if levels.field && noise.field_m == 0.0 {
             (noise.field_m, noise.field_rad) = (noise.robot_m, noise.robot_rad);
+        }
+        if levels.arm && noise.link_rad == 0.0 {
+            [noise.link_rad, noise.link_m, noise.compliance_rad] = LEVELS_OF_ARMS;
         }
     }
     let (mut iterations, mut deviance) = (0, None);
@@ -210,7 +213,7 @@ pub(crate) fn with_stated_error(
     let integrated = if problem.noise.is_some() {
         Integrated { covariance: plain.clone(), small_sample: SmallSample::KNOWN }
     } else {
-        let levels = Levels { view: noise.view_px > 0.0, field: state.field.is_some() };
+        let levels = Levels { view: noise.view_px > 0.0, field: state.field.is_some(), arm: state.arm.is_some() };
         integrated::integrate(system, noise, levels, plain.clone(), &solution.reference_point)?
     };
     let optimum = Optimum { problem, state: &state, system, noise, reduced: &reduced, covariance: &plain };
@@ -257,7 +260,7 @@ fn finish(
         intrinsics: state.intrinsics,
         shape: state.shape,
         depth: state.depth,
-        joint_offsets_rad: state.joints_rad.clone(),
+        arm: state.arm.clone(),
         field: state.field.clone(),
         deviance: None,
         covariance,

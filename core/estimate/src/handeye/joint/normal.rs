@@ -2,9 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
-use super::pose_dependent_error::HALF;
+use super::variance::levels_of_effects;
 use super::view_block::{Layout, Own, PixelWeights, Rest, ViewBlock, add_rest, add_square, columns, prior_weight};
-use super::{DepthWeight, JOINT_PRIOR_RAD, JointProblem, Noise};
+use super::{DepthWeight, JointProblem, Noise};
 use crate::handeye::HandEyeError;
 use crate::handeye::joint::state::State;
 use handeye_geometry::progress::CancelToken;
@@ -38,11 +38,11 @@ pub struct System {
     pub blocks: Vec<ViewBlock>,
     pub corrections: Vec<Vector6<f64>>,
     pub layout: Layout,
-    /// Of all but the lens and the robot's field, whose priors are its noise levels.
+    /// Of all but the lens, and the effects whose priors are their levels.
     priors: Vec<SharedPrior>,
     known_lens: Option<KnownLens>,
-    /// Slopes of the field.
-    pub slopes: Vec<f64>,
+    /// Slopes of the field and errors of the arm, as they are now.
+    pub effects: Vec<f64>,
     /// Sum of `Jsᵀ Js` over the poses' parts of the views, upper triangle.
     shared: DMatrix<f64>,
     /// Sum of `Jsᵀ r` likewise.
@@ -61,9 +61,9 @@ impl System {
             blocks: Vec::with_capacity(problem.views.len()),
             corrections: state.corrections.clone(),
             layout,
-            priors: priors(problem, state, layout),
+            priors: priors(problem, state),
             known_lens: known_lens(problem, state),
-            slopes: state.field.as_ref().map_or_else(Vec::new, |field| field.slopes().to_vec()),
+            effects: state.effects(),
             shared: DMatrix::zeros(n, n),
             shared_gradient: DVector::zeros(n),
             rest: Rest::nothing(layout.form),
@@ -114,13 +114,12 @@ impl System {
 
     fn known(&self, noise: &Noise) -> impl Iterator<Item = SharedPrior> {
         let at = self.layout.field_at();
-        let precisions = [noise.field_m.powi(-2), noise.field_rad.powi(-2)];
-        let of_field = self.slopes.iter().enumerate().map(move |(k, slope)| SharedPrior {
-            index: at + k,
-            offset: *slope,
-            precision: precisions[k / HALF],
+        let of_kinds = self.layout.effects().into_iter().zip(levels_of_effects(noise));
+        let of_effects = of_kinds.flat_map(move |(kind, level)| {
+            let precision = level.powi(-2);
+            kind.map(move |index| SharedPrior { index, offset: self.effects[index - at], precision })
         });
-        self.priors.iter().copied().chain(of_field)
+        self.priors.iter().copied().chain(of_effects)
     }
 
     /// The cost of what is known beforehand of the shared unknowns, after a step of them.
@@ -208,23 +207,11 @@ impl System {
     }
 }
 
-/// Prior of a joint whose offset cannot be told: as good as none.
-const HELD_JOINT_RAD: f64 = 1e-8;
-
 /// Standard deviations of offset, scale and slope of a depth camera before any data: metres, a part, pixels. They are no knowledge,
 /// but where the board is always as far away its distance tells no offset from a scale.
 const DEPTH_PRIOR: [f64; 3] = [0.1, 0.1, 3.0];
 
-fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<SharedPrior> {
-    // The target takes up an offset of the first joint, and the hand-eye or the target one of the last: freeing them adds
-    // nothing but the width of their prior.
-    let last = state.joints_rad.len().saturating_sub(1);
-    let sigma = |j: usize| if j == 0 || j == last { HELD_JOINT_RAD } else { JOINT_PRIOR_RAD };
-    let joints = state.joints_rad.iter().enumerate().map(|(j, offset)| SharedPrior {
-        index: layout.joints_at() + j,
-        offset: *offset,
-        precision: sigma(j).powi(-2),
-    });
+fn priors(problem: &JointProblem<'_>, state: &State) -> Vec<SharedPrior> {
     let depth_at = Layout::FORM_AT + problem.free.form().depth_at(&state.intrinsics);
     // Where the depths do not count nothing tells the tilt.
     let tilt = problem.depth.map_or(1.0, DepthWeight::tilt_sigma_rad);
@@ -234,7 +221,7 @@ fn priors(problem: &JointProblem<'_>, state: &State, layout: Layout) -> Vec<Shar
         offset,
         precision: sigma.powi(-2),
     });
-    joints.chain(depth.filter(|_| problem.free.depth)).collect()
+    depth.filter(|_| problem.free.depth).collect()
 }
 
 fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {

@@ -13,6 +13,7 @@ use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector6};
 
 use super::normal::System;
 use super::pose_dependent_error;
+use super::variance::levels_of_effects;
 use super::view_block::{Layout, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, Noise, fit};
 use crate::handeye::HandEyeError;
@@ -159,7 +160,7 @@ fn distances(
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
         by_shared.columns_mut(Layout::FORM_AT, layout.form).copy_from(&factor.solve(&equations.pose_by_form));
-        by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&chain.by_joints.columns(0, layout.joints));
+        by_shared.columns_mut(layout.arm_at(), chain.by_arm.ncols()).copy_from(&chain.by_arm);
         if let Some(field) = &state.field {
             let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
             by_shared.columns_mut(layout.field_at(), pose_dependent_error::SLOPES).copy_from(&columns);
@@ -187,17 +188,16 @@ fn distances(
     Ok(judged.collect())
 }
 
-/// The slopes of the robot's field, position and orientation: where they are among the shared unknowns, their variance, and on
+/// The effects of each kind, slopes of the robot's field and errors of its arm: where they are among the shared unknowns, their variance, and on
 /// how many of them, which the data determine, that rests.
 fn slopes(system: &System, noise: &Noise, covariance: &DMatrix<f64>) -> Vec<(Range<usize>, f64, f64)> {
-    let halves = [(0, noise.field_m), (pose_dependent_error::HALF, noise.field_rad)];
-    let halves = halves.into_iter().filter(|(at, _)| *at < system.slopes.len()).map(|(at, sigma)| {
-        let first = system.layout.field_at() + at;
-        let part = first..first + pose_dependent_error::HALF;
+    let kinds = system.layout.effects().into_iter().zip(levels_of_effects(noise));
+    let kinds = kinds.filter(|(part, _)| !part.is_empty()).map(|(part, sigma)| {
         let unknown: f64 = part.clone().map(|i| covariance[(i, i)]).sum::<f64>() / sigma.powi(2);
-        (part, sigma.powi(2), pose_dependent_error::HALF as f64 - unknown)
+        let count = part.len() as f64;
+        (part, sigma.powi(2), count - unknown)
     });
-    halves.collect()
+    kinds.collect()
 }
 
 /// The pose of a view by its corners alone with the lens and the target of the state, and the equations there; `None` when

@@ -13,7 +13,8 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
 
-use super::chain::{base_from_tip_by_joints, correction_transform};
+use super::arm_errors::ArmErrors;
+use super::chain::correction_transform;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::targets::observation::View;
 
@@ -156,18 +157,20 @@ impl PoseDependentError {
     }
 }
 
-/// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints, none
-/// where they are empty, and its field.
+/// The reported tip pose of a view with what is known of the robot's errors taken out: those of its arm and its field.
 pub fn corrected_base_from_tip(
     view: &View,
-    offsets_rad: &[f64],
+    arm: Option<&ArmErrors>,
     field: Option<&PoseDependentError>,
 ) -> Pose<Base, Tip> {
-    let by_joints = base_from_tip_by_joints(view, offsets_rad);
-    field.map_or(by_joints, |field| {
-        let correction = correction_transform(&field.correction(&view.base_from_tip));
-        Pose::from_isometry(by_joints.isometry() * correction)
-    })
+    let mut base_from_tip = *view.base_from_tip.isometry();
+    if let Some(arm) = arm {
+        base_from_tip *= arm.reported_from_true(&view.base_from_tip, &view.tip_from_joints);
+    }
+    if let Some(field) = field {
+        base_from_tip *= correction_transform(&field.correction(&view.base_from_tip));
+    }
+    Pose::from_isometry(base_from_tip)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::handeye::Mode;
-use crate::handeye::joint::chain::MAX_JOINTS;
+use crate::handeye::joint::arm_errors::ArmErrors;
 use crate::handeye::joint::pose_dependent_error::{Places, PoseDependentError};
 use crate::handeye::joint::state::State;
 use crate::handeye::joint::weights::CornerWeights;
@@ -24,9 +24,8 @@ pub struct Free {
     pub warp: bool,
     /// The true size of the target over the stated one. It is seen through the robot's translations alone.
     pub scale: bool,
-    /// A constant offset of every joint, where the views say how the tip turns with them, with a prior of
-    /// [`JOINT_PRIOR_RAD`](super::JOINT_PRIOR_RAD). Those of the first and the last joint stay zero: the two links take them up.
-    pub joints: bool,
+    /// Errors of the robot's arm, where all views know its joints, see [`ArmErrors`].
+    pub arm: bool,
     /// Errors of the robot that depend on where it stands, see [`PoseDependentError`].
     pub field: bool,
     /// Errors of the depths of the views, see [`DepthBias`](handeye_geometry::view_equations::DepthBias).
@@ -132,10 +131,11 @@ impl<'a> JointProblem<'a> {
         self.weights.map_or(Whitener::Alike, |weights| weights.whitener(&view.corners))
     }
 
-    /// Number of joint offsets that are estimated: none unless all views know their joints.
-    pub(super) fn joint_count(&self) -> usize {
-        let fewest = self.views.iter().map(|view| view.tip_by_joint.len()).min().unwrap_or(0);
-        if self.free.joints { fewest.min(MAX_JOINTS) } else { 0 }
+    /// The arm without errors, where they are free and all views know its joints.
+    pub(crate) fn arm(&self) -> Option<ArmErrors> {
+        let joints = self.views.first()?.tip_from_joints.len();
+        let all = joints > 1 && self.views.iter().all(|view| view.tip_from_joints.len() == joints);
+        (self.free.arm && all).then(|| ArmErrors::none(joints))
     }
 
     /// The field without errors, where it is free and the tip does not stay where it is.

@@ -67,7 +67,7 @@ fn gains(with: &JointProblem<'_>, without: &JointSolution, cancel: &CancelToken)
     let system = System::new(with, &state, cancel)?;
     let Noise { robot_m: field_m, robot_rad: field_rad, .. } = without.noise;
     let start = Noise { field_m, field_rad, ..without.noise };
-    let levels = Levels { view: start.view_px > 0.0, field: true };
+    let levels = Levels { view: start.view_px > 0.0, field: true, arm: false };
     let start = variance::lifted(&system, &start, levels);
     let found = start.and_then(|start| variance::restricted_likelihood(&system, &start, levels, variance::ROUGHLY));
     Ok(determined(found)?.is_some_and(|(_, field)| plain - field >= NEARLY * GAIN))

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector6};
 
 use crate::handeye::joint::JointProblem;
+use crate::handeye::joint::arm_errors::ArmErrors;
 use crate::handeye::joint::integrated::SmallSample;
 use crate::handeye::joint::normal::System;
 use crate::handeye::joint::pose_dependent_error::{PoseDependentError, corrected_base_from_tip};
@@ -43,14 +44,14 @@ pub struct JointSolution {
     pub shape: BoardShape,
     /// Errors of the depths; none where they were not estimated.
     pub depth: DepthBias,
-    /// Offsets of the joints, radians, to be added to the reported angles; empty when they were not estimated.
-    pub joint_offsets_rad: Vec<f64>,
+    /// Errors of the robot's arm; `None` when they were not estimated.
+    pub arm: Option<ArmErrors>,
     /// Errors of the robot that depend on where it stands; `None` when they were not estimated.
     pub field: Option<PoseDependentError>,
     /// Minus twice the log of the restricted likelihood of the noise levels; `None` when these were given.
     pub deviance: Option<f64>,
     /// Covariance of `[mount_from_camera (6), anchor_from_target (6), free intrinsics…, free warps, free scale, errors of
-    /// depths, joints, slopes of the field]`, metres, radians, pixels; right perturbations. It includes the robot's noise
+    /// depths, slopes of the field, errors of the arm]`, metres, radians, pixels; right perturbations. It includes the robot's noise
     /// and the uncertainty of every other unknown, that of estimated noise levels too.
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of its covariance.
@@ -117,12 +118,6 @@ impl JointSolution {
         if self.free.depth { self.covariance.fixed_view::<5, 5>(at, at).into_owned() } else { Matrix5::zeros() }
     }
 
-    /// Standard deviations of the joint offsets, radians.
-    pub fn joint_offsets_sigma(&self) -> Vec<f64> {
-        let at = 12 + self.free.form().count(&self.intrinsics);
-        (at..at + self.joint_offsets_rad.len()).map(|i| self.sigma(i)).collect()
-    }
-
     fn sigma(&self, index: usize) -> f64 {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
@@ -140,10 +135,9 @@ impl JointSolution {
         12..12 + self.free.form().warp_at(&self.intrinsics)
     }
 
-    /// The reported tip pose of a view with what is known of the robot's errors taken out: the offsets of its joints and
-    /// its field.
+    /// The reported tip pose of a view with what is known of the robot's errors taken out: those of its arm and its field.
     pub fn base_from_tip(&self, view: &View) -> Pose<Base, Tip> {
-        corrected_base_from_tip(view, &self.joint_offsets_rad, self.field.as_ref())
+        corrected_base_from_tip(view, self.arm.as_ref(), self.field.as_ref())
     }
 
     /// Where the iteration ended, to start another from.

@@ -2,6 +2,7 @@
 
 use nalgebra::{DVector, Point3, Vector6};
 
+use crate::handeye::joint::arm_errors::{ArmErrors, KINDS};
 use crate::handeye::joint::chain::Chain;
 use crate::handeye::joint::pose_dependent_error::{PoseDependentError, SLOPES};
 use crate::handeye::joint::view_block::Layout;
@@ -22,8 +23,8 @@ pub struct State {
     pub shape: BoardShape,
     /// None where it is not free.
     pub depth: DepthBias,
-    /// Empty when the joints are not free.
-    pub joints_rad: Vec<f64>,
+    /// `None` when they are not free, and where a view does not know its joints.
+    pub arm: Option<ArmErrors>,
     /// `None` when it is not free.
     pub field: Option<PoseDependentError>,
     /// Of every view, beyond that of the field.
@@ -38,7 +39,7 @@ impl State {
             intrinsics: start.intrinsics,
             shape: start.shape,
             depth: DepthBias::default(),
-            joints_rad: vec![0.0; problem.joint_count()],
+            arm: problem.arm(),
             field: problem.field(),
             corrections: vec![Vector6::zeros(); problem.views.len()],
         }
@@ -52,7 +53,7 @@ impl State {
             intrinsics: solution.intrinsics,
             shape: solution.shape,
             depth: solution.depth,
-            joints_rad: solution.joint_offsets_rad.clone(),
+            arm: solution.arm.clone(),
             field: solution.field.clone(),
             corrections: solution.views.iter().map(|view| view.correction).collect(),
         }
@@ -61,9 +62,15 @@ impl State {
     pub fn layout(&self, problem: &JointProblem<'_>) -> Layout {
         Layout {
             form: problem.free.form().count(&self.intrinsics),
-            joints: self.joints_rad.len(),
             field: if self.field.is_some() { SLOPES } else { 0 },
+            arm: self.arm.as_ref().map_or([0; KINDS], ArmErrors::counts),
         }
+    }
+
+    /// Slopes of the field and errors of the arm, in the order of the unknowns.
+    pub fn effects(&self) -> Vec<f64> {
+        let of_field = self.field.iter().flat_map(PoseDependentError::slopes);
+        of_field.chain(self.arm.iter().flat_map(ArmErrors::values)).copied().collect()
     }
 
     /// Correction of a view by the field.
@@ -73,10 +80,10 @@ impl State {
 
     /// The chain of one view with a correction beyond that of the field.
     pub fn chain(&self, problem: &JointProblem<'_>, view: &View, correction: &Vector6<f64>) -> Chain {
-        Chain::with_joints(
+        Chain::with_arm(
             problem.mode,
             view,
-            &self.joints_rad,
+            self.arm.as_ref(),
             &(correction + self.by_field(view)),
             &self.mount_from_camera,
             &self.anchor_from_target,
@@ -109,11 +116,11 @@ impl State {
             next.depth = DepthBias::new(std::array::from_fn(|k| before[k] + at(first + k)));
         }
         let layout = self.layout(problem);
-        for (j, offset) in next.joints_rad.iter_mut().enumerate() {
-            *offset += shared[layout.joints_at() + j];
-        }
         for (k, slope) in next.field.iter_mut().flat_map(PoseDependentError::slopes_mut).enumerate() {
             *slope += shared[layout.field_at() + k];
+        }
+        for (k, error) in next.arm.iter_mut().flat_map(ArmErrors::values_mut).enumerate() {
+            *error += shared[layout.arm_at() + k];
         }
         for (correction, step) in next.corrections.iter_mut().zip(own) {
             *correction += step;
@@ -148,10 +155,7 @@ impl State {
         if form.depth {
             put(at(form.depth_at(&self.intrinsics)), &self.depth.values(), &other.depth.values());
         }
-        put(layout.joints_at(), &self.joints_rad, &other.joints_rad);
-        if let (Some(from), Some(to)) = (&self.field, &other.field) {
-            put(layout.field_at(), from.slopes(), to.slopes());
-        }
+        put(layout.field_at(), &self.effects(), &other.effects());
         step
     }
 

@@ -1,29 +1,47 @@
 //! Noise levels from the data: restricted maximum likelihood of the linearised model.
 //!
 //! With all unknowns integrated out, minus twice the log-likelihood of the noise levels is
-//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` (and nine times each of
-//! `ln field_m²` and `ln field_rad²`, where the robot's field is in the model) for `n` residuals of `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
+//! `(n − 6 N) ln corner² + 6 N ln (corner² + view²) + 3 N ln robot_m² + 3 N ln robot_rad² + ln det H + Q` (and of the effects in the model,
+//! slopes of the robot's field and errors of its arm, their number times the log of the variance of their kind) for `n` residuals of `N` views, where `H` is the normal matrix and `Q` the least weighted cost. Its derivative by the log of each variance is
 //! the familiar `count - expected sum of squares`, the fixed point of the EM iteration; Newton on the logs gets there in a
 //! few steps where EM crawls when the robot is nearly exact.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
+use super::arm_errors::LEVELS_OF_ARMS;
 use super::information::information;
 use super::normal::{Reduced, System};
-use super::pose_dependent_error::HALF;
-use super::view_block::{add_square, columns, prior_weight};
+use super::view_block::{EFFECTS, add_square, columns, prior_weight};
 use super::{JointProblem, Noise};
 use crate::handeye::joint::state::State;
 use crate::handeye::{HandEyeError, determined};
 
 /// Lowest levels: a nanometre, a nanoradian and a millionth of a pixel are exact for every purpose here.
-const LOWEST: Noise =
-    Noise { corner_px: 1e-6, view_px: 0.0, robot_m: 1e-9, robot_rad: 1e-9, field_m: 1e-9, field_rad: 1e-9 };
+const LOWEST: Noise = Noise {
+    corner_px: 1e-6,
+    view_px: 0.0,
+    robot_m: 1e-9,
+    robot_rad: 1e-9,
+    field_m: 1e-9,
+    field_rad: 1e-9,
+    link_rad: 1e-9,
+    link_m: 1e-9,
+    compliance_rad: 1e-9,
+};
 /// Highest levels: beyond them the robot pose says nothing.
-const HIGHEST: Noise =
-    Noise { corner_px: 1e4, view_px: 1e4, robot_m: 1.0, robot_rad: 1.0, field_m: 1.0, field_rad: 1.0 };
-/// A field of less than this part of the robot's noise is none, and how much less does not matter.
-const NO_FIELD: f64 = 1e-3;
+const HIGHEST: Noise = Noise {
+    corner_px: 1e4,
+    view_px: 1e4,
+    robot_m: 1.0,
+    robot_rad: 1.0,
+    field_m: 1.0,
+    field_rad: 1.0,
+    link_rad: 1.0,
+    link_m: 1.0,
+    compliance_rad: 1.0,
+};
+/// Effects of less than this part of the robot's noise are none, and how much less does not matter.
+const NO_EFFECT: f64 = 1e-3;
 /// Newton steps.
 const MAX_STEPS: usize = 60;
 /// Largest change of a log-variance in one step.
@@ -42,6 +60,8 @@ pub struct Levels {
     pub view: bool,
     /// The robot's field.
     pub field: bool,
+    /// The errors of its arm.
+    pub arm: bool,
 }
 
 impl Levels {
@@ -50,7 +70,8 @@ impl Levels {
         (0..LEVELS).filter(move |k| match k {
             0..3 => true,
             3 => self.view,
-            _ => self.field,
+            ..ARM_AT => self.field,
+            _ => self.arm,
         })
     }
 
@@ -64,27 +85,36 @@ impl Levels {
     }
 
     /// The same of a matrix with rows and columns per level; those of a level that is not estimated are zero.
-    pub fn folded_matrix(self, of_levels: &Matrix6<f64>) -> Matrix6<f64> {
-        let mut fold = Matrix6::identity();
-        if !self.view {
-            fold[(3, 3)] = 0.0;
-            fold[(0, 3)] = 1.0;
+    pub fn folded_matrix(self, of_levels: &LevelMatrix) -> LevelMatrix {
+        let mut fold = LevelMatrix::zeros();
+        for k in self.estimated() {
+            fold[(k, k)] = 1.0;
         }
-        if !self.field {
-            fold[(4, 4)] = 0.0;
-            fold[(5, 5)] = 0.0;
+        if !self.view {
+            fold[(0, 3)] = 1.0;
         }
         fold * of_levels * fold.transpose()
     }
 }
 
+/// Place of the first level of effects.
+pub const EFFECTS_AT: usize = 4;
+/// Place of the first level of the arm's errors.
+const ARM_AT: usize = EFFECTS_AT + 2;
 /// Number of levels.
-pub const LEVELS: usize = 6;
+pub const LEVELS: usize = EFFECTS_AT + EFFECTS;
 
 /// Logs of the variances of a corner, of the robot's position and orientation, of the part of a view that looks like a
-/// pose, and of the field's position and orientation. The fourth follows the first where it is not estimated, and the last
-/// two mean nothing then.
-pub type Logs = Vector6<f64>;
+/// pose, and of the kinds of effects. The fourth follows the first where it is not estimated, and those of effects mean nothing
+/// then.
+pub type Logs = SVector<f64, LEVELS>;
+/// Rows and columns per level.
+pub type LevelMatrix = SMatrix<f64, LEVELS, LEVELS>;
+
+/// The standard deviation of each kind of effects.
+pub fn levels_of_effects(noise: &Noise) -> [f64; EFFECTS] {
+    [noise.field_m, noise.field_rad, noise.link_rad, noise.link_m, noise.compliance_rad]
+}
 
 /// Rough levels for the first round: the robot is taken to explain the start's misfit with generous room.
 pub fn starting_noise(problem: &JointProblem<'_>, state: &State) -> Noise {
@@ -112,8 +142,11 @@ pub fn change(a: &Noise, b: &Noise) -> f64 {
         .max(relative(a.corner_px + a.view_px, b.corner_px + b.view_px, LOWEST.corner_px))
         .max(relative(a.robot_m, b.robot_m, LOWEST.robot_m))
         .max(relative(a.robot_rad, b.robot_rad, LOWEST.robot_rad))
-        .max(relative(a.field_m, b.field_m, NO_FIELD * a.robot_m))
-        .max(relative(a.field_rad, b.field_rad, NO_FIELD * a.robot_rad))
+        .max(relative(a.field_m, b.field_m, NO_EFFECT * a.robot_m))
+        .max(relative(a.field_rad, b.field_rad, NO_EFFECT * a.robot_rad))
+        .max(relative(a.link_rad, b.link_rad, NO_EFFECT * LEVELS_OF_ARMS[0]))
+        .max(relative(a.link_m, b.link_m, NO_EFFECT * LEVELS_OF_ARMS[1]))
+        .max(relative(a.compliance_rad, b.compliance_rad, NO_EFFECT * LEVELS_OF_ARMS[2]))
 }
 
 /// Minus twice the restricted log-likelihood at some levels, and what goes with it.
@@ -137,6 +170,10 @@ pub struct Likelihood {
 fn to_noise(logs: &Logs, levels: Levels) -> Noise {
     let level = |i: usize, low: f64, high: f64| (0.5 * logs[i]).exp().clamp(low, high);
     let corner_px = level(0, LOWEST.corner_px, HIGHEST.corner_px);
+    let effect = |kind: usize, is_estimated: bool| {
+        let (low, high) = (levels_of_effects(&LOWEST)[kind], levels_of_effects(&HIGHEST)[kind]);
+        if is_estimated { level(EFFECTS_AT + kind, low, high) } else { 0.0 }
+    };
     Noise {
         corner_px,
         // Of a level that is not estimated rounding would leave a difference, which then counted as one.
@@ -147,8 +184,11 @@ fn to_noise(logs: &Logs, levels: Levels) -> Noise {
         },
         robot_m: level(1, LOWEST.robot_m, HIGHEST.robot_m),
         robot_rad: level(2, LOWEST.robot_rad, HIGHEST.robot_rad),
-        field_m: if levels.field { level(4, LOWEST.field_m, HIGHEST.field_m) } else { 0.0 },
-        field_rad: if levels.field { level(5, LOWEST.field_rad, HIGHEST.field_rad) } else { 0.0 },
+        field_m: effect(0, levels.field),
+        field_rad: effect(1, levels.field),
+        link_rad: effect(2, levels.arm),
+        link_m: effect(3, levels.arm),
+        compliance_rad: effect(4, levels.arm),
     }
 }
 
@@ -156,20 +196,16 @@ fn to_noise(logs: &Logs, levels: Levels) -> Noise {
 pub fn to_logs(noise: &Noise) -> Logs {
     let together = noise.corner_px.powi(2) + noise.view_px.powi(2);
     let log = |level: f64| 2.0 * level.ln();
-    Logs::new(
-        log(noise.corner_px),
-        log(noise.robot_m),
-        log(noise.robot_rad),
-        together.ln(),
-        log(noise.field_m.max(LOWEST.field_m)),
-        log(noise.field_rad.max(LOWEST.field_rad)),
-    )
+    let of_effects = levels_of_effects(noise).into_iter().zip(levels_of_effects(&LOWEST));
+    let [corner, m, rad] = [noise.corner_px, noise.robot_m, noise.robot_rad].map(log);
+    let all = [corner, m, rad, together.ln()].into_iter().chain(of_effects.map(|(level, low)| log(level.max(low))));
+    Logs::from_iterator(all)
 }
 
 /// Keeps the logs in their range, and the pose's part no smaller than what independent corners make of it.
 pub fn kept(mut logs: Logs, levels: Levels) -> Logs {
     let (low, high) = (to_logs(&LOWEST), to_logs(&HIGHEST));
-    for i in [0, 1, 2, 4, 5] {
+    for i in (0..LEVELS).filter(|i| *i != 3) {
         logs[i] = logs[i].clamp(low[i], high[i]);
     }
     logs[3] = if levels.view { logs[3].clamp(logs[0], high[3]) } else { logs[0] };
@@ -224,32 +260,36 @@ pub fn evaluate(system: &System, logs: &Logs, levels: Levels) -> Result<Likeliho
     let corner_trace = unknowns - halves[0].1 - halves[1].1 - known_trace;
     let rest = system.rest_squares(&step, &covariance);
     let (rest_squares, rest_trace) = (rest.0 / noise.corner_px.powi(2), rest.1 / noise.corner_px.powi(2));
-    let (mut field_squares, mut field_traces) = ([0.0; 2], [0.0; 2]);
-    let variance = [noise.field_m.powi(2), noise.field_rad.powi(2)];
-    for (k, slope) in system.slopes.iter().enumerate() {
-        let (index, half) = (system.layout.field_at() + k, k / HALF);
-        field_squares[half] += (slope + step[index]).powi(2) / variance[half];
-        field_traces[half] += covariance[(index, index)] / variance[half];
-    }
-    let slopes = if levels.field { HALF as f64 } else { 0.0 };
-    let value = in_rest * logs[0]
-        + slopes * (logs[4] + logs[5])
-        + in_poses * logs[3]
-        + 3.0 * views * (logs[1] + logs[2])
-        + reduced.log_determinant()
-        + least_cost;
     let [m, rad] = halves;
-    let counts = Logs::new(
+    let mut counts = Logs::zeros();
+    let mut sums = Logs::zeros();
+    counts.fixed_rows_mut::<EFFECTS_AT>(0).copy_from_slice(&[
         in_rest - rest_trace,
         3.0 * views - m.1,
         3.0 * views - rad.1,
         in_poses - (corner_trace - rest_trace),
-        slopes - field_traces[0],
-        slopes - field_traces[1],
-    );
-    let squares =
-        Logs::new(rest_squares, m.0, rad.0, corner_squares - rest_squares, field_squares[0], field_squares[1]);
-    let gradient = levels.folded(counts - squares);
+    ]);
+    sums.fixed_rows_mut::<EFFECTS_AT>(0).copy_from_slice(&[rest_squares, m.0, rad.0, corner_squares - rest_squares]);
+    let mut of_effects = 0.0;
+    for (kind, (places, level)) in system.layout.effects().into_iter().zip(levels_of_effects(&noise)).enumerate() {
+        let at = EFFECTS_AT + kind;
+        of_effects += places.len() as f64 * logs[at];
+        counts[at] = places.len() as f64;
+        for index in places {
+            let effect = system.effects[index - system.layout.field_at()] + step[index];
+            sums[at] += (effect / level).powi(2);
+            counts[at] -= covariance[(index, index)] / level.powi(2);
+        }
+    }
+    let (of_arms, by_arms) = prior_of_arms(logs, levels);
+    let value = in_rest * logs[0]
+        + of_effects
+        + of_arms
+        + in_poses * logs[3]
+        + 3.0 * views * (logs[1] + logs[2])
+        + reduced.log_determinant()
+        + least_cost;
+    let gradient = levels.folded(counts - sums) + by_arms;
     Ok(Likelihood { value, gradient, counts, moments, reduced, covariance, step })
 }
 
@@ -261,7 +301,7 @@ pub struct MostLikely {
 
 impl MostLikely {
     /// About half the second derivatives of what was minimised, by the log-variances; zero for a level that is not estimated.
-    pub fn information(&self, system: &System, levels: Levels, aim: Aim) -> Matrix6<f64> {
+    pub fn information(&self, system: &System, levels: Levels, aim: Aim) -> LevelMatrix {
         0.5 * slope(system, &self.logs, &self.at, levels, aim).1
     }
 }
@@ -275,7 +315,21 @@ pub enum Aim {
     Posterior,
 }
 
-/// Minus twice the log of the prior density of the log-variances: proportional to [`Likelihood::counts`]. It is flat where
+/// Minus twice the log of the density of the log-variances of an arm's errors by [`LEVELS_OF_ARMS`], and its derivatives. It is
+/// part of the likelihood: what is known of arms is known of them in every fit.
+fn prior_of_arms(logs: &Logs, levels: Levels) -> (f64, Logs) {
+    let (mut value, mut gradient) = (0.0, Logs::zeros());
+    if levels.arm {
+        for (k, usual) in (ARM_AT..).zip(LEVELS_OF_ARMS) {
+            let ratio = logs[k].exp() / usual.powi(2);
+            value += 2.0 * ratio.ln_1p() - logs[k];
+            gradient[k] = 2.0 * ratio / (1.0 + ratio) - 1.0;
+        }
+    }
+    (value, gradient)
+}
+
+/// Minus twice the log of the prior density of the other log-variances: proportional to [`Likelihood::counts`]. It is flat where
 /// a level is seen well, as Jeffreys' prior of a variance is, so that a level which only a few numbers tell gives Student's
 /// distribution; and it falls with the variance itself below what the noise of the other levels lets be seen, so that a
 /// level of nothing takes the place that it has among the others and no more.
@@ -285,7 +339,7 @@ pub enum Aim {
 /// one level; it is Jeffreys' up to a constant where all views are alike).
 pub fn prior(at: &Likelihood, levels: Levels) -> f64 {
     let counts = levels.folded(at.counts);
-    -2.0 * levels.estimated().map(|k| counts[k].max(f64::MIN_POSITIVE).ln()).sum::<f64>()
+    -2.0 * levels.estimated().filter(|k| *k < ARM_AT).map(|k| counts[k].max(f64::MIN_POSITIVE).ln()).sum::<f64>()
 }
 
 /// Finds the levels where `aim` is least, beginning at `start`, until a step gains less than `tolerance`.
@@ -330,8 +384,10 @@ pub fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, Ha
     const SEEN: f64 = 0.2;
     let mut logs = kept(to_logs(noise), levels);
     let counts = evaluate(system, &logs, levels)?.counts;
-    let (robot, field) = (3.0 * system.blocks.len() as f64, HALF as f64);
-    for (k, all) in [(1, robot), (2, robot), (4, field), (5, field)] {
+    let robot = 3.0 * system.blocks.len() as f64;
+    let effects = system.layout.effects().map(|places| places.len() as f64);
+    let of_effects = (EFFECTS_AT..).zip(effects).filter(|(_, all)| *all > 0.0);
+    for (k, all) in [(1, robot), (2, robot)].into_iter().chain(of_effects) {
         let seen = (counts[k] / all).clamp(1e-12, 1.0);
         if seen < SEEN {
             logs[k] += (SEEN / seen).ln();
@@ -341,12 +397,18 @@ pub fn lifted(system: &System, noise: &Noise, levels: Levels) -> Result<Logs, Ha
 }
 
 /// Derivatives of what is minimised, the second ones as expected.
-fn slope(system: &System, logs: &Logs, at: &Likelihood, levels: Levels, aim: Aim) -> (Logs, Matrix6<f64>) {
+fn slope(system: &System, logs: &Logs, at: &Likelihood, levels: Levels, aim: Aim) -> (Logs, LevelMatrix) {
     let information = information(system, &to_noise(logs, levels), at, levels);
     let (mut gradient, mut curvature) = (at.gradient, 2.0 * information);
+    if levels.arm {
+        for (k, usual) in (ARM_AT..).zip(LEVELS_OF_ARMS) {
+            let ratio = logs[k].exp() / usual.powi(2);
+            curvature[(k, k)] += 2.0 * ratio / (1.0 + ratio).powi(2);
+        }
+    }
     if aim == Aim::Posterior {
         let counts = levels.folded(at.counts);
-        for k in levels.estimated() {
+        for k in levels.estimated().filter(|k| *k < ARM_AT) {
             // The count of a level grows with its own variance and shrinks with that of the others, which hide it.
             let count = counts[k].max(f64::MIN_POSITIVE);
             gradient[k] -= 2.0;
@@ -371,7 +433,7 @@ pub fn restricted_likelihood(
 }
 
 /// A step down even where the likelihood is not convex in the logs: eigenvalues are taken by their absolute value.
-fn newton_step(hessian: &Matrix6<f64>, gradient: &Logs, damping: f64) -> Logs {
+fn newton_step(hessian: &LevelMatrix, gradient: &Logs, damping: f64) -> Logs {
     let eigen = hessian.symmetric_eigen();
     let mut step = Logs::zeros();
     for i in 0..LEVELS {

@@ -1,14 +1,17 @@
 //! The normal equations of one view in the unknowns that all views share and in its own pose correction.
 //!
-//! The shared unknowns are `[mount_from_camera (6), anchor_from_target (6), lens and shape of the target, joints, slopes of
-//! the robot's field]`.
+//! The shared unknowns are `[mount_from_camera (6), anchor_from_target (6), lens and shape of the target, slopes of the robot's
+//! field, errors of its arm]`.
 //! Blocks are kept without the noise levels, so that these can be varied cheaply.
+
+use std::ops::Range;
 
 use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix6, Matrix6xX, MatrixXx6, Vector3, Vector6};
 
 use super::Noise;
+use super::arm_errors::KINDS;
 use super::chain::Chain;
-use super::pose_dependent_error::{self, SLOPES};
+use super::pose_dependent_error::{self, HALF, SLOPES};
 use handeye_geometry::view_equations::PoseEquations;
 
 /// Where which shared unknown is.
@@ -16,27 +19,42 @@ use handeye_geometry::view_equations::PoseEquations;
 pub struct Layout {
     /// Number of unknowns of lens and target shape.
     pub form: usize,
-    /// Number of joint offsets.
-    pub joints: usize,
     /// Number of slopes of the robot's field.
     pub field: usize,
+    /// Numbers of angles, lengths and compliances of the arm.
+    pub arm: [usize; KINDS],
 }
+
+/// Kinds of random effects, each with a level of its own: slopes of the field's position and orientation, and what can be off about
+/// an arm.
+pub const EFFECTS: usize = 2 + KINDS;
 
 impl Layout {
     /// First unknown of lens and shape.
     pub const FORM_AT: usize = 12;
 
-    pub fn joints_at(self) -> usize {
+    pub fn field_at(self) -> usize {
         Self::FORM_AT + self.form
     }
 
-    pub fn field_at(self) -> usize {
-        self.joints_at() + self.joints
+    pub fn arm_at(self) -> usize {
+        self.field_at() + self.field
     }
 
     /// Number of shared unknowns.
     pub fn count(self) -> usize {
-        self.field_at() + self.field
+        self.arm_at() + self.arm.iter().sum::<usize>()
+    }
+
+    /// Where the effects of each kind are.
+    pub fn effects(self) -> [Range<usize>; EFFECTS] {
+        let [angles, lengths, compliances] = self.arm;
+        let half = if self.field > 0 { HALF } else { 0 };
+        let mut at = self.field_at();
+        [half, half, angles, lengths, compliances].map(|count| {
+            at += count;
+            at - count..at
+        })
     }
 }
 
@@ -149,8 +167,7 @@ impl ViewBlock {
         by_shared.fixed_columns_mut::<6>(0).copy_from(&(by_pose * chain.by_hand_eye));
         by_shared.fixed_columns_mut::<6>(6).copy_from(&by_pose);
         by_shared.columns_mut(Layout::FORM_AT, layout.form).copy_from(&by_form);
-        let by_joints = chain.by_joints.columns(0, layout.joints);
-        by_shared.columns_mut(layout.joints_at(), layout.joints).copy_from(&(by_pose * by_joints));
+        by_shared.columns_mut(layout.arm_at(), chain.by_arm.ncols()).copy_from(&(by_pose * &chain.by_arm));
         if let Some(place) = place {
             by_shared
                 .columns_mut(layout.field_at(), SLOPES)

@@ -4,9 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::handeye::HandEyeError;
 use crate::handeye::joint::state::State;
-use crate::handeye::joint::{
-    JointProblem, JointSolution, base_from_tip_by_joints, camera_from_target, corrected_base_from_tip,
-};
+use crate::handeye::joint::{JointProblem, JointSolution, camera_from_target, corrected_base_from_tip};
 use crate::handeye::motion::MIN_VIEWS;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
@@ -144,12 +142,12 @@ fn prediction_squares(problem: &JointProblem<'_>, fit: &State, view: &View) -> O
         };
         view.corners.iter().map(squared).sum()
     };
-    let base_from_tip = corrected_base_from_tip(view, &fit.joints_rad, fit.field.as_ref());
+    let base_from_tip = corrected_base_from_tip(view, fit.arm.as_ref(), fit.field.as_ref());
     let predicted = camera_from_target(problem.mode, &base_from_tip, &x, &y);
     let px = squared_px(&predicted)?;
     let links_px = if fit.field.is_some() {
-        let by_joints = base_from_tip_by_joints(view, &fit.joints_rad);
-        squared_px(&camera_from_target(problem.mode, &by_joints, &x, &y))?
+        let by_links = corrected_base_from_tip(view, fit.arm.as_ref(), None);
+        squared_px(&camera_from_target(problem.mode, &by_links, &x, &y))?
     } else {
         px
     };

@@ -1,0 +1,108 @@
+//! `handeye correct`: what to command so that the tip gets where it shall be, by the errors of the arm that a calibration found.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use clap::Args;
+use handeye_dataset::correct_table::{read_joint_values, read_wanted};
+use handeye_estimate::corrected_arm::CorrectedArm;
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_workbench::arguments::heading;
+
+use super::export::read_result;
+use super::output::Output;
+use crate::{Failure, out};
+
+/// At the end of its help.
+pub const EXAMPLES: &str = "Examples:
+  handeye correct result.json wanted.csv > commands.csv
+  handeye correct result.json reported.csv --from-reported --out real.csv";
+
+/// Options of `handeye correct`.
+#[derive(Debug, Args)]
+pub struct CorrectArgs {
+    /// Solved session or dataset (a folder with result.json or calibration.json), or a result JSON, of an arm whose joints are known.
+    calibration: PathBuf,
+    /// CSV with a row for each pose that the tip shall reach: x,y,z,qx,qy,qz,qw in the base, metres; q1,q2,… may follow, joint
+    /// values in radians near which the arm shall be.
+    table: PathBuf,
+    /// The rows are joint values q1,q2,… instead, radians, and the answer is where the tip really is.
+    #[arg(long)]
+    from_reported: bool,
+    /// Write the answer to this file instead of standard output.
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    out: Option<Output>,
+}
+
+/// Writes the table: joint values, the pose by the controller's own kinematics (with `--from-reported` the real one), and how far off
+/// the tip is expected to be at the most. Moves nothing.
+pub fn run(args: &CorrectArgs) -> Result<(), Failure> {
+    let result = read_result(&args.calibration)?;
+    let arm = result.arm.as_ref().ok_or_else(|| {
+        Failure::unusable(anyhow!(
+            "{} knows no errors of an arm: calibrate with the arm (`[robot.arm]` in dataset.toml, or a cell that says which it is) and \
+             joint values in every row",
+            args.calibration.display()
+        ))
+    })?;
+    if arm.contradicted {
+        tracing::warn!(
+            "views left out of the calibration are predicted worse by corrected poses than by reported ones: do not use these \
+             commands before more views agree with them"
+        );
+    }
+    let corrected = arm.corrected_arm().map_err(Failure::unusable)?;
+    let text = if args.from_reported { actual(&corrected, args)? } else { commands(&corrected, args)? };
+    match &args.out {
+        Some(output) => output.write(text.as_bytes()),
+        None => out::print(&text),
+    }
+}
+
+fn commands(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<String, Failure> {
+    let count = corrected.arm.joint_count();
+    let mut text = header(count);
+    let mut near = middle(corrected);
+    for wanted in read_wanted(&args.table, count).map_err(Failure::unusable)? {
+        near = wanted.near_rad.unwrap_or(near);
+        let command = corrected
+            .command(&wanted.base_from_tip, &near)
+            .map_err(|error| Failure::unusable(anyhow!("{}, row {}: {error}", args.table.display(), wanted.line)))?;
+        row(&mut text, &command.joints_rad, &command.base_from_tip, command.error_95_m);
+        near = command.joints_rad;
+    }
+    Ok(text)
+}
+
+fn actual(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<String, Failure> {
+    let count = corrected.arm.joint_count();
+    let mut text = header(count);
+    for (line, joints_rad) in read_joint_values(&args.table, count).map_err(Failure::unusable)? {
+        let at = |error| Failure::unusable(anyhow!("{}, row {line}: {error}", args.table.display()));
+        let pose = corrected.actual(&joints_rad).map_err(at)?;
+        row(&mut text, &joints_rad, &pose, corrected.error_95_m(&joints_rad).map_err(at)?);
+    }
+    Ok(text)
+}
+
+/// Where the search for a first row begins that says nothing: in the middle of what the joints can do.
+fn middle(corrected: &CorrectedArm) -> Vec<f64> {
+    let middle = |range: handeye_arm::JointRange| {
+        if range.min.is_finite() && range.max.is_finite() { f64::midpoint(range.min, range.max) } else { 0.0 }
+    };
+    corrected.arm.ranges().into_iter().map(middle).collect()
+}
+
+fn header(joints: usize) -> String {
+    let joints: String = (1..=joints).map(|joint| format!("q{joint},")).collect();
+    format!("{joints}x,y,z,qx,qy,qz,qw,error_95_mm\n")
+}
+
+fn row(text: &mut String, joints_rad: &[f64], pose: &Pose<Base, Tip>, error_95_m: f64) {
+    for value in joints_rad.iter().chain(pose.translation().iter()).chain(&pose.xyzw()) {
+        // A nanometre and a nanoradian, and no minus before what is nothing.
+        let _infallible = write!(text, "{:.9},", value + 0.0);
+    }
+    let _infallible = writeln!(text, "{:.3}", error_95_m * 1e3);
+}

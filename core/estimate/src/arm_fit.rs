@@ -1,0 +1,87 @@
+//! The arm's own errors within a calibration: what they are, and the transforms that go with them.
+
+use nalgebra::DMatrix;
+
+use crate::handeye::joint::{self, ArmErrors, Free, JointProblem, JointSolution, Noise, SmallSample, arm_parameters};
+use crate::handeye::{HandEye, HandEyeError, determined};
+use crate::uncertainty::quality;
+use handeye_geometry::progress::Work;
+use handeye_geometry::statistics::better_by_chance;
+
+/// The errors of the robot's arm as the views show them, and the calibration by the tip poses that they make. Both transforms are
+/// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
+#[derive(Debug, Clone)]
+pub struct ArmFit {
+    /// The errors.
+    pub errors: ArmErrors,
+    /// Both rigid links, by corrected tip poses.
+    pub hand_eye: HandEye,
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right
+    /// perturbations. The uncertainty of the lens and of everything else that is estimated is in it.
+    pub covariance: DMatrix<f64>,
+    /// How the error of the hand-eye transform is distributed in units of that.
+    pub small_sample: SmallSample,
+    /// Noise levels, those of the arm's errors among them; what of the robot remains is what its links do not explain.
+    pub noise: Noise,
+    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses and by corrected ones; `None` with too few views.
+    pub heldout_px: Option<[f64; 2]>,
+    /// Whether views left out are predicted worse by corrected poses than by reported ones, by more than chance.
+    pub contradicted: bool,
+}
+
+/// Probability that views left out are predicted worse by chance, at which corrected poses are not believed.
+const WORSE_BY_CHANCE: f64 = 0.05;
+
+impl ArmFit {
+    /// Standard deviations of the errors, in the order of [`arm_parameters`].
+    pub fn sigma(&self) -> Vec<f64> {
+        (12..self.covariance.nrows()).map(|i| self.covariance[(i, i)].max(0.0).sqrt()).collect()
+    }
+
+    /// Standard deviation of each error before any data, by the level of its kind.
+    pub fn levels(&self) -> Vec<f64> {
+        let levels = [self.noise.link_rad, self.noise.link_m, self.noise.compliance_rad];
+        arm_parameters(self.errors.joint_count()).iter().map(|parameter| levels[parameter.error.kind()]).collect()
+    }
+}
+
+/// The errors of the arm by the views of a joint estimate; `None` where these do not know its joints, where the noise levels are
+/// given, and where there is no answer with them.
+pub(crate) fn arm_fit(
+    problem: &JointProblem<'_>,
+    solution: &JointSolution,
+    work: &Work<'_>,
+) -> Result<Option<ArmFit>, HandEyeError> {
+    let with = JointProblem { free: Free { arm: true, ..problem.free }, ..*problem };
+    if with.arm().is_none() || problem.noise.is_some() {
+        return Ok(None);
+    }
+    let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
+    let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
+    let Some(errors) = fit.arm.clone() else { return Ok(None) };
+    let before = quality::held_out_squares_px(problem, solution, work.cancel)?;
+    let after = quality::held_out_squares_px(&with, &fit, work.cancel)?;
+    let heldout = before.zip(after);
+    let corners: usize = problem.views.iter().map(|view| view.corners.len()).sum();
+    let rms_px = |squares: &[f64]| (squares.iter().sum::<f64>() / corners as f64).sqrt();
+    let contradicted = heldout.as_ref().is_some_and(|(before, after)| {
+        let losses: Vec<f64> = before.iter().zip(after).map(|(before, after)| after - before).collect();
+        losses.iter().sum::<f64>() > 0.0 && better_by_chance(&losses) < WORSE_BY_CHANCE
+    });
+    let count = errors.values().len();
+    let first = fit.covariance.nrows() - count;
+    let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
+    Ok(Some(ArmFit {
+        errors,
+        hand_eye: fit.hand_eye,
+        covariance: fit.covariance.select_rows(&kept).select_columns(&kept),
+        small_sample: fit.small_sample,
+        noise: fit.noise,
+        heldout_px: heldout.map(|(before, after)| [rms_px(&before), rms_px(&after)]),
+        contradicted,
+    }))
+}
+
+#[cfg(test)]
+#[path = "arm_fit_tests.rs"]
+mod tests;

@@ -1,0 +1,79 @@
+use handeye_geometry::frames::Pose;
+use handeye_geometry::progress::CancelToken;
+use handeye_geometry::targets::observation::View;
+use handeye_simulate::session::{ArmError, Setup, session};
+
+use super::*;
+use crate::handeye::Mode;
+use crate::handeye::joint::camera_from_target;
+use crate::{Method, fit as calibrated};
+
+/// What is off about the links of a usual arm, by another convention than the estimator's: `a`, `d` \[m\], `alpha`, zero \[rad\].
+const LINKS: [[f64; 4]; 6] = [
+    [1e-4, -2e-4, 4e-4, 0.0],
+    [-3e-4, 0.0, -9e-4, 1.2e-3],
+    [4e-4, 1e-4, 6e-4, -8e-4],
+    [0.0, 5e-4, -7e-4, 1.5e-3],
+    [1e-4, -1e-4, 5e-4, -1e-3],
+    [0.0, 2e-4, 0.0, 0.0],
+];
+
+/// RMS of the residuals of views that were not in the fit, pixels, by reported poses and by corrected ones.
+fn predicted(of: &Setup, fitted: usize) -> (ArmFit, [f64; 2]) {
+    let all = session(of);
+    let mut observations = all.observations(false);
+    observations.views.truncate(fitted);
+    let fit = calibrated(&observations, Method::Joint, &CancelToken::default()).expect("solves");
+    let arm = fit.joint.as_ref().and_then(|joint| joint.arm.clone()).expect("the joints are known");
+    let squares = |view: &View, hand_eye: &HandEye, pose| -> f64 {
+        let (x, y) = (hand_eye.mount_from_camera(), hand_eye.anchor_from_target());
+        let seen = camera_from_target(all.mode, &pose, &x, &y);
+        let off = |corner: &handeye_geometry::targets::observation::Corner| {
+            let px = all.intrinsics.project(&(seen.isometry() * all.points[corner.index])).expect("in front");
+            (px - corner.px).norm_squared()
+        };
+        view.corners.iter().map(off).sum::<f64>() / view.corners.len() as f64
+    };
+    let rest = &all.views[fitted..];
+    let mean = |of: &dyn Fn(&View) -> f64| (rest.iter().map(of).sum::<f64>() / rest.len() as f64).sqrt();
+    let plain = fit.hand_eye.expect("an answer");
+    let reported = mean(&|view: &View| squares(view, &plain, view.base_from_tip));
+    let corrected = mean(&|view: &View| {
+        let tip = arm.errors.of_view(view).reported_from_true;
+        squares(view, &arm.hand_eye, Pose::from_isometry(view.base_from_tip.isometry() * tip))
+    });
+    (arm, [reported, corrected])
+}
+
+fn with(mode: Mode, arm_error: ArmError, seed: u64) -> Setup {
+    Setup { joints: true, arm_error, ..Setup::new(mode, 40, seed) }
+}
+
+#[test]
+fn corrected_poses_predict_what_reported_ones_do_not() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::Links(LINKS), 5), 20);
+        println!("{mode:?}: {reported:.3} → {corrected:.3} px, levels {:?}", arm.noise);
+        // The robot of the session, 0.1 mm and 0.02°, is a third of a pixel.
+        assert!(corrected < 0.6 * reported && corrected < 0.6, "{mode:?}: {reported} → {corrected} px");
+        let [before, after] = arm.heldout_px.expect("twenty views");
+        assert!(after < before && !arm.contradicted, "{mode:?}: {before} → {after} px");
+    }
+}
+
+#[test]
+fn an_exact_arm_is_left_as_it_is() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::None, 6), 20);
+        println!("{mode:?}: {reported:.3} → {corrected:.3} px");
+        assert!(corrected < 1.1 * reported, "{mode:?}: {reported} → {corrected} px");
+        assert!(!arm.contradicted, "{mode:?}");
+    }
+}
+
+#[test]
+fn views_that_do_not_know_their_joints_have_no_arm() {
+    let session = session(&Setup::new(Mode::EyeInHand, 12, 7));
+    let fit = calibrated(&session.observations(false), Method::Joint, &CancelToken::default()).expect("solves");
+    assert!(fit.joint.expect("a joint estimate").arm.is_none());
+}

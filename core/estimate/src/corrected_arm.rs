@@ -1,0 +1,179 @@
+//! An arm whose own errors are known: where its tip really is, and what to command so that it gets where it shall be.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector6};
+
+use crate::arm_fit::ArmFit;
+use crate::handeye::joint::{ArmErrors, SmallSample};
+use handeye_arm::{Arm, ArmError, IkError};
+use handeye_geometry::frames::{Base, Pose, Tip};
+
+/// Steps of [`CorrectedArm::command`]. Each leaves of the distance what the errors of the arm are of its size: a few parts in a
+/// thousand, and some parts in a hundred where zeros are off by degrees.
+const STEPS: usize = 20;
+/// Distance in metres and angle in radians at which a command has arrived.
+const ARRIVED: f64 = 1e-9;
+
+/// An arm as its controller takes it to be, where it stands, and what it is off.
+#[derive(Debug, Clone)]
+pub struct CorrectedArm {
+    /// As the controller takes it to be.
+    pub arm: Arm,
+    /// What it is off.
+    pub errors: ArmErrors,
+    /// Covariance of the errors, in the order of [`arm_parameters`](crate::handeye::joint::arm_parameters).
+    pub covariance: DMatrix<f64>,
+    /// What they do not explain, standard deviations of the tip's position \[m\] and orientation \[rad\] per axis.
+    pub unexplained: (f64, f64),
+    /// How errors are distributed in units of the covariance.
+    pub small_sample: SmallSample,
+}
+
+/// Why there is no command.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
+#[non_exhaustive]
+pub enum CorrectError {
+    /// The joint values given are of no use.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+    /// The arm does not get there.
+    #[error(transparent)]
+    Reach(#[from] IkError),
+    /// The corrected pose moves on with every step.
+    #[error(
+        "no command was found that takes the tip there: after {steps} steps it is {distance_mm:.3} mm off; the pose is where \
+         the arm is stretched or its wrist is straight: choose another orientation"
+    )]
+    NotFound {
+        /// How many steps were taken.
+        steps: usize,
+        /// How far off the last one is, millimetres.
+        distance_mm: f64,
+    },
+}
+
+/// A command and what is known of where it takes the tip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Command {
+    /// Joint values to be commanded: radians.
+    pub joints_rad: Vec<f64>,
+    /// The same as the controller's own kinematics has it.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The distance that the tip stays under from where it shall be, with a probability of 95 %, metres.
+    pub error_95_m: f64,
+}
+
+impl CorrectedArm {
+    /// That of a calibration, with the arm where it stands, see [`place`](crate::placement::place); `None` where it is of an arm with
+    /// another number of joints.
+    pub fn new(arm: Arm, fit: &ArmFit) -> Option<Self> {
+        let count = fit.errors.values().len();
+        (arm.joint_count() == fit.errors.joint_count()).then(|| Self {
+            arm,
+            errors: fit.errors.clone(),
+            covariance: fit.covariance.view((12, 12), (count, count)).into_owned(),
+            unexplained: (fit.noise.robot_m, fit.noise.robot_rad),
+            small_sample: fit.small_sample,
+        })
+    }
+
+    /// Where the tip really is with these joint values.
+    ///
+    /// # Errors
+    /// As [`Arm::forward`].
+    pub fn actual(&self, joints_rad: &[f64]) -> Result<Pose<Base, Tip>, ArmError> {
+        let reported = self.arm.forward(joints_rad)?;
+        let frames = self.arm.tip_from_joints(&reported, joints_rad)?;
+        Ok(Pose::from_isometry(reported.isometry() * self.errors.reported_from_true(&reported, &frames)))
+    }
+
+    /// How far the tip is from [`Self::actual`] at the most with a probability of 95 %, metres.
+    ///
+    /// # Errors
+    /// As [`Arm::forward`].
+    pub fn error_95_m(&self, joints_rad: &[f64]) -> Result<f64, ArmError> {
+        let covariance: Matrix6<f64> = self.tip_covariance(joints_rad)?;
+        Ok(self.small_sample.radius_95(&position(&covariance)))
+    }
+
+    /// Covariance of the tip's pose `[t; r]` in its own axes: what is not known of the errors, and what they do not explain.
+    ///
+    /// # Errors
+    /// As [`Arm::forward`].
+    pub fn tip_covariance(&self, joints_rad: &[f64]) -> Result<Matrix6<f64>, ArmError> {
+        let reported = self.arm.forward(joints_rad)?;
+        let frames = self.arm.tip_from_joints(&reported, joints_rad)?;
+        let by_errors = self.errors.true_tip(&reported, &frames).by_errors;
+        let known = &by_errors * &self.covariance * by_errors.transpose();
+        let (m, rad) = (self.unexplained.0.powi(2), self.unexplained.1.powi(2));
+        let unexplained = Matrix6::from_diagonal(&Vector6::new(m, m, m, rad, rad, rad));
+        Ok(unexplained + Matrix6::from_iterator(known.iter().copied()))
+    }
+
+    /// What to command so that the tip really is at `wanted`, by the configuration nearest to `near`.
+    ///
+    /// # Errors
+    /// [`CorrectError`] says why the arm does not get there.
+    pub fn command(&self, wanted: &Pose<Base, Tip>, near: &[f64]) -> Result<Command, CorrectError> {
+        let mut pose = *wanted;
+        let mut joints_rad = near.to_vec();
+        let mut distance_m = f64::INFINITY;
+        for _ in 0..STEPS {
+            joints_rad = self.arm.inverse(&pose, &joints_rad)?;
+            let actual = self.actual(&joints_rad)?;
+            let (off_m, off_rad) = actual.distance_to(wanted);
+            if off_m.max(off_rad) < ARRIVED {
+                let error_95_m = self.error_95_m(&joints_rad)?;
+                return Ok(Command { base_from_tip: self.arm.forward(&joints_rad)?, joints_rad, error_95_m });
+            }
+            distance_m = off_m;
+            // What the tip is off by there it is off by nearby.
+            let by_errors = actual.inverse() * pose;
+            pose = *wanted * by_errors;
+        }
+        Err(CorrectError::NotFound { steps: STEPS, distance_mm: distance_m * 1e3 })
+    }
+}
+
+fn position(covariance: &Matrix6<f64>) -> Matrix3<f64> {
+    covariance.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::handeye::joint::arm_parameters;
+    use handeye_arm::ArmKind;
+
+    fn corrected(degrees: f64) -> CorrectedArm {
+        let count = arm_parameters(6).len();
+        let size = |k: usize| if arm_parameters(6)[k].error.kind() == 1 { 1e-3 } else { degrees.to_radians() };
+        let values = (0..count).map(|k| size(k) * ((k * k) as f64).sin()).collect();
+        CorrectedArm {
+            arm: ArmKind::Ur5e.arm(),
+            errors: ArmErrors::new(6, values).expect("so many"),
+            covariance: DMatrix::identity(count, count) * 1e-10,
+            unexplained: (2e-5, 1e-5),
+            small_sample: SmallSample::KNOWN,
+        }
+    }
+
+    #[test]
+    fn what_is_commanded_takes_the_tip_where_it_shall_be() {
+        let joints = [0.3, -1.3, 1.7, -1.9, -1.6, 0.4];
+        for degrees in [0.05, 2.0] {
+            let corrected = corrected(degrees);
+            let wanted = corrected.arm.forward(&joints).expect("six joints");
+            let command = corrected.command(&wanted, &joints).expect("within reach");
+            let (off_m, off_rad) = corrected.actual(&command.joints_rad).expect("six joints").distance_to(&wanted);
+            assert!(off_m < 1e-9 && off_rad < 1e-9, "{degrees}°: {off_m} m, {off_rad} rad");
+            assert!(command.base_from_tip.distance_to(&wanted).0 > 1e-4, "the errors are seen");
+            assert!(command.error_95_m > 2e-5 && command.error_95_m < 1e-3, "{}", command.error_95_m);
+        }
+    }
+
+    #[test]
+    fn a_pose_out_of_reach_says_so() {
+        let far = Pose::from_isometry(nalgebra::Isometry3::translation(3.0, 0.0, 0.0));
+        assert!(matches!(corrected(0.05).command(&far, &[0.1; 6]), Err(CorrectError::Reach(_))));
+    }
+}

@@ -1,0 +1,354 @@
+//! How near a tool arrives at a point that the camera saw: by the controller as it is, and by corrected commands.
+//!
+//! # What it estimates
+//! The distance between a point of the target, seen by the camera from a pose of the session, and the tip of a tool that is sent
+//! there: its 95 % quantile over the views, over points of the target, over directions of the tool and over what is not known of
+//! arm and camera. The tool is sent against the target's normal with the camera on the arm, along the mean axis of the tip with the
+//! camera beside it, tilted by up to 15° with any turn about itself. The place of its tip behind the flange is what the same arm finds
+//! by turning about one point, as people do.
+//!
+//! # How
+//! Errors of the arm and both transforms are drawn from their joint posterior; every draw is an arm that the data allow. What is
+//! commanded does not depend on the draw, so the inverse kinematics is solved once for each touch, and a tool that is found a
+//! little elsewhere is counted to first order. The draws are the same in every run.
+//!
+//! # Degenerate cases
+//! Touches out of reach of the arm are left out; with fewer than a quarter of them left nothing is stated.
+
+use nalgebra::{Cholesky, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use crate::arm_fit::ArmFit;
+use crate::corrected_arm::CorrectedArm;
+use crate::handeye::draw::Draw;
+use crate::handeye::joint::ArmErrors;
+use crate::handeye::{HandEye, Mode};
+use handeye_arm::Arm;
+use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::se3;
+use handeye_geometry::targets::TargetSpec;
+
+/// Touches of a session.
+const TOUCHES: usize = 24;
+/// Draws of arm and camera.
+const DRAWS: usize = 100;
+/// Poses in which the tip of the tool is found.
+const PIVOTS: usize = 8;
+/// Tilt of the tool at the most, radians.
+const TILT_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
+/// Share of errors within what is stated.
+const LEVEL: f64 = 0.95;
+/// Of the draws: the same in every run.
+const SEED: u64 = 0x72_6561_6368;
+
+/// Length of a tool that nobody has named, along z of the tip, metres.
+pub const USUAL_TOOL_M: f64 = 0.1;
+
+/// A view of the session.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// Joint values as reported, radians.
+    pub joints_rad: Vec<f64>,
+    /// Where the camera saw the target.
+    pub camera_from_target: Pose<Camera, Target>,
+}
+
+/// Distances that a touch stays under with a probability of 95 %, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReachErrors {
+    /// By reported poses, the transform that goes with them, and commands as they are.
+    pub as_it_is_95_m: f64,
+    /// By corrected poses and commands.
+    pub corrected_95_m: f64,
+}
+
+/// One way of going about it: by reported poses, or by corrected ones.
+struct Way<'a> {
+    hand_eye: HandEye,
+    /// What the way takes the tip to be off: nothing where it is by reported poses.
+    believed: &'a ArmErrors,
+}
+
+/// A touch by one way.
+struct Touch {
+    /// Joint values of the view and of the command.
+    view: At,
+    command: At,
+    /// The point in the camera.
+    in_camera: Point3<f64>,
+    /// Turn of the tip in the base as the way takes it to be.
+    turn: UnitQuaternion<f64>,
+}
+
+/// An arm at some joint values.
+struct At {
+    base_from_tip: Pose<Base, Tip>,
+    tip_from_joints: Vec<Isometry3<f64>>,
+}
+
+impl At {
+    fn new(arm: &Arm, joints_rad: &[f64]) -> Option<Self> {
+        let base_from_tip = arm.forward(joints_rad).ok()?;
+        let tip_from_joints = arm.tip_from_joints(&base_from_tip, joints_rad).ok()?;
+        Some(Self { base_from_tip, tip_from_joints })
+    }
+
+    fn tip(&self, errors: &ArmErrors) -> Isometry3<f64> {
+        self.base_from_tip.isometry() * errors.reported_from_true(&self.base_from_tip, &self.tip_from_joints)
+    }
+}
+
+/// The errors of reach of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the
+/// tool is in the frame of the tip, metres. `None` where too few touches are in reach.
+pub fn reach_errors(
+    arm: &CorrectedArm,
+    fit: &ArmFit,
+    answer: &HandEye,
+    views: &[Seen],
+    target: &TargetSpec,
+    tool: &Vector3<f64>,
+) -> Option<ReachErrors> {
+    let nothing = ArmErrors::none(fit.errors.joint_count());
+    let ways = [Way { hand_eye: *answer, believed: &nothing }, Way { hand_eye: fit.hand_eye, believed: &fit.errors }];
+    let mut random = Draw::new(SEED);
+    let planned = planned(views, target, &mut random);
+    let turns: Vec<UnitQuaternion<f64>> =
+        (0..PIVOTS).map(|_| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5))).collect();
+    let draws = Draws::new(fit, &mut random)?;
+    let mut stated = [0.0; 2];
+    for (stated, way) in stated.iter_mut().zip(&ways) {
+        let touches: Vec<Touch> = planned.iter().filter_map(|plan| way.touch(arm, views, plan, tool)).collect();
+        if 4 * touches.len() < TOUCHES {
+            return None;
+        }
+        let pivots = way.pivots(arm, &touches[0], &turns, views, tool);
+        let mut distances: Vec<f64> = Vec::with_capacity(DRAWS * touches.len());
+        for draw in &draws.0 {
+            let found = way.tool_by(&pivots, &draw.errors, tool)?;
+            distances.extend(touches.iter().map(|touch| way.miss(touch, draw, tool, &found).norm()));
+        }
+        distances.sort_by(f64::total_cmp);
+        *stated = distances[((distances.len() as f64 * LEVEL) as usize).min(distances.len() - 1)];
+    }
+    Some(ReachErrors { as_it_is_95_m: stated[0], corrected_95_m: stated[1] })
+}
+
+/// Which point of the target is touched after which view, and how the tool is turned against the target.
+struct Plan {
+    view: usize,
+    point: Point3<f64>,
+    turn: UnitQuaternion<f64>,
+}
+
+fn planned(views: &[Seen], target: &TargetSpec, random: &mut Draw) -> Vec<Plan> {
+    let points = target.points();
+    let plan = |k: usize| {
+        let azimuth = random.even() * std::f64::consts::TAU;
+        let tilt = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * (TILT_RAD * random.even().sqrt());
+        let about = Vector3::z() * random.even() * std::f64::consts::TAU;
+        Plan {
+            view: k * views.len() / TOUCHES,
+            point: points[random.below(points.len())],
+            turn: UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(about),
+        }
+    };
+    if views.is_empty() || points.is_empty() { Vec::new() } else { (0..TOUCHES).map(plan).collect() }
+}
+
+impl Way<'_> {
+    /// Where the camera is when the tip is there.
+    fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isometry3<f64> {
+        match hand_eye {
+            HandEye::EyeInHand { tip_from_camera, .. } => base_from_tip * tip_from_camera.isometry(),
+            HandEye::EyeToHand { base_from_camera, .. } => *base_from_camera.isometry(),
+        }
+    }
+
+    fn touch(&self, arm: &CorrectedArm, views: &[Seen], plan: &Plan, tool: &Vector3<f64>) -> Option<Touch> {
+        let seen = &views[plan.view];
+        let view = At::new(&arm.arm, &seen.joints_rad)?;
+        let in_camera = seen.camera_from_target.isometry() * plan.point;
+        let base_from_tip = view.tip(self.believed);
+        let base_from_camera = Self::camera(&self.hand_eye, &base_from_tip);
+        let along = match self.hand_eye.mode() {
+            // A target's z axis points away from who looks at it.
+            Mode::EyeInHand => base_from_camera.rotation * seen.camera_from_target.isometry().rotation,
+            Mode::EyeToHand => facing(&mean_axis(arm, views)?),
+        };
+        let turn = along * plan.turn;
+        let point = base_from_camera * in_camera;
+        let goal = Isometry3::from_parts((point.coords - turn * tool).into(), turn);
+        let joints = self.joints(arm, &goal, &seen.joints_rad)?;
+        Some(Touch { view, command: At::new(&arm.arm, &joints)?, in_camera, turn })
+    }
+
+    /// Joint values that take the tip there as the way takes it to be.
+    fn joints(&self, arm: &CorrectedArm, goal: &Isometry3<f64>, near: &[f64]) -> Option<Vec<f64>> {
+        let by_way = CorrectedArm { errors: self.believed.clone(), ..arm.clone() };
+        by_way.command(&Pose::from_isometry(*goal), near).ok().map(|command| command.joints_rad)
+    }
+
+    /// The arm at turns about the point of a touch.
+    fn pivots(
+        &self,
+        arm: &CorrectedArm,
+        touch: &Touch,
+        turns: &[UnitQuaternion<f64>],
+        views: &[Seen],
+        tool: &Vector3<f64>,
+    ) -> Vec<(At, UnitQuaternion<f64>)> {
+        let tip = touch.command.tip(self.believed);
+        let point = tip * Point3::from(*tool);
+        let at = |turn: &UnitQuaternion<f64>| {
+            let turn = touch.turn * turn;
+            let goal = Isometry3::from_parts((point.coords - turn * tool).into(), turn);
+            let joints = self.joints(arm, &goal, &views[0].joints_rad)?;
+            Some((At::new(&arm.arm, &joints)?, turn))
+        };
+        turns.iter().filter_map(at).collect()
+    }
+
+    /// Where the way finds the tip of the tool in the frame of its tip, when the arm is off by `errors` and turns about one point: with
+    /// `l_k` the tip of the tool as it is at turn `R_k`, the place `t` and the shift `s` of the point for which all `R_k (t − l_k) − s` are
+    /// least. Where the arm reaches too few turns it is where it is.
+    fn tool_by(
+        &self,
+        pivots: &[(At, UnitQuaternion<f64>)],
+        errors: &ArmErrors,
+        tool: &Vector3<f64>,
+    ) -> Option<Vector3<f64>> {
+        let (mut information, mut right) = (Matrix6::zeros(), Vector6::zeros());
+        for (at, turn) in pivots {
+            let believed_from_true = at.tip(self.believed).inverse() * at.tip(errors);
+            let place = (believed_from_true * Point3::from(*tool)).coords;
+            let mut row = Matrix3x6::zeros();
+            row.fixed_columns_mut::<3>(0).copy_from(turn.to_rotation_matrix().matrix());
+            row.fixed_columns_mut::<3>(3).copy_from(&-Matrix3::identity());
+            information += row.transpose() * row;
+            right += row.transpose() * (turn * place);
+        }
+        if pivots.len() < PIVOTS / 2 {
+            return Some(*tool);
+        }
+        Some(Cholesky::new(information)?.solve(&right).fixed_rows::<3>(0).into_owned())
+    }
+
+    /// From the point to the tip of the tool.
+    fn miss(&self, touch: &Touch, draw: &Possible, tool: &Vector3<f64>, found: &Vector3<f64>) -> Vector3<f64> {
+        let at_view = touch.view.tip(&draw.errors) * draw.at_view;
+        let point = Self::camera(&draw.hand_eye, &at_view) * touch.in_camera;
+        let tip = touch.command.tip(&draw.errors) * draw.at_touch * Point3::from(*tool);
+        // The command was for the tool as it is.
+        tip - point - touch.turn * (found - tool)
+    }
+}
+
+/// An arm and a camera that the data allow.
+struct Possible {
+    errors: ArmErrors,
+    hand_eye: HandEye,
+    /// What the errors do not explain.
+    at_view: Isometry3<f64>,
+    at_touch: Isometry3<f64>,
+}
+
+struct Draws(Vec<Possible>);
+
+impl Draws {
+    fn new(fit: &ArmFit, random: &mut Draw) -> Option<Self> {
+        let root = Cholesky::new(fit.covariance.clone())?.l();
+        let count = fit.covariance.nrows();
+        // As good as infinite.
+        let freedom = fit.small_sample.degrees_of_freedom.min(1e4);
+        let law = ChiSquared::new(freedom).ok()?;
+        let mut draws = Vec::with_capacity(DRAWS);
+        for _ in 0..DRAWS {
+            let unexplained = |random: &mut Draw| {
+                let sigma = |i: usize| if i < 3 { fit.noise.robot_m } else { fit.noise.robot_rad };
+                se3::exp(&Vector6::from_fn(|i, _| sigma(i) * random.normal()))
+            };
+            let (at_view, at_touch) = (unexplained(random), unexplained(random));
+            let step = &root * DVector::from_fn(count, |_, _| random.normal());
+            let step = step * (freedom / law.inverse_cdf(random.even())).sqrt();
+            let perturb = |at: usize| -> Vector6<f64> { step.fixed_rows::<6>(at).into_owned() };
+            let values = fit.errors.values().iter().zip(step.rows(12, count - 12).iter()).map(|(a, b)| a + b).collect();
+            draws.push(Possible {
+                errors: ArmErrors::new(fit.errors.joint_count(), values)?,
+                hand_eye: HandEye::new(
+                    fit.hand_eye.mode(),
+                    fit.hand_eye.mount_from_camera().perturbed(&perturb(0)),
+                    fit.hand_eye.anchor_from_target().perturbed(&perturb(6)),
+                ),
+                at_view,
+                at_touch,
+            });
+        }
+        Some(Self(draws))
+    }
+}
+
+/// The mean z axis of the tip over the views, in the base.
+fn mean_axis(arm: &CorrectedArm, views: &[Seen]) -> Option<Vector3<f64>> {
+    let axes = views.iter().filter_map(|seen| Some(arm.arm.forward(&seen.joints_rad).ok()?.rotation() * Vector3::z()));
+    axes.sum::<Vector3<f64>>().try_normalize(1e-9)
+}
+
+/// A turn whose z axis is along a direction.
+fn facing(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), direction)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+}
+
+#[cfg(test)]
+mod tests {
+    use handeye_arm::ArmKind;
+    use handeye_geometry::progress::CancelToken;
+    use handeye_simulate::session::{ArmError, Session, Setup, session};
+
+    use super::*;
+    use crate::{Fit, Method, fit};
+
+    fn solved(mode: Mode, arm_error: ArmError) -> (Session, Fit, Vec<Seen>) {
+        let session = session(&Setup { joints: true, arm_error, ..Setup::new(mode, 20, 9) });
+        let found = fit(&session.observations(false), Method::Joint, &CancelToken::default()).expect("solves");
+        let near = [0.0, -1.2, 1.6, -1.9, -1.5, 0.0];
+        let seen = session.views.iter().zip(&found.views).map(|(view, found)| Seen {
+            joints_rad: ArmKind::Ur5.arm().inverse(&view.base_from_tip, &near).expect("within reach"),
+            camera_from_target: found.camera_from_target.expect("used"),
+        });
+        let seen = seen.collect();
+        (session, found, seen)
+    }
+
+    fn stated(session: &Session, found: &Fit, seen: &[Seen]) -> Option<ReachErrors> {
+        let fit = found.joint.as_ref()?.arm.as_ref()?;
+        let arm = CorrectedArm::new(ArmKind::Ur5.arm(), fit)?;
+        reach_errors(&arm, fit, found.hand_eye.as_ref()?, seen, &session.target, &(Vector3::z() * USUAL_TOOL_M))
+    }
+
+    #[test]
+    fn an_arm_whose_links_are_off_arrives_nearer_by_corrected_commands_and_an_exact_one_as_near() {
+        let mut links = [[2e-4, -3e-4, 1e-3, 1.5e-3]; 6];
+        links[2] = [-5e-4, 0.0, -1.5e-3, -2e-3];
+        for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+            let (session, found, seen) = solved(mode, ArmError::Links(links));
+            let off = stated(&session, &found, &seen).expect("an arm in reach");
+            let (session, found, seen) = solved(mode, ArmError::None);
+            let exact = stated(&session, &found, &seen).expect("an arm in reach");
+            println!("{mode:?}: {off:?}, exact {exact:?}");
+            assert!(off.corrected_95_m < 0.7 * off.as_it_is_95_m, "{mode:?}: {off:?}");
+            assert!(exact.as_it_is_95_m < 0.7 * off.as_it_is_95_m, "{mode:?}: {exact:?}");
+            assert_eq!(stated(&session, &found, &seen), Some(exact), "the same in every run");
+        }
+    }
+
+    #[test]
+    fn touches_out_of_reach_are_no_error_that_is_known() {
+        let (session, found, mut seen) = solved(Mode::EyeInHand, ArmError::None);
+        for view in &mut seen {
+            view.camera_from_target = Pose::from_isometry(Isometry3::translation(0.0, 0.0, 9.0));
+        }
+        assert_eq!(stated(&session, &found, &seen), None);
+        assert_eq!(stated(&session, &found, &[]), None);
+    }
+}

@@ -1,0 +1,266 @@
+//! The errors of an arm in a result, and the arm that is corrected by them.
+
+use nalgebra::{DMatrix, Matrix6};
+use serde::{Deserialize, Serialize};
+
+use super::TransformEstimate;
+use super::check::{BadResult, Checked, all_finite, not_negative, require};
+use handeye_arm::Arm;
+use handeye_estimate::ArmFit;
+use handeye_estimate::corrected_arm::CorrectedArm;
+use handeye_estimate::handeye::joint::{ArmErrors, LinkError, SmallSample, arm_parameters};
+
+/// The errors of the robot's arm as the images show them, and the transforms that go with corrected poses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ArmEstimate {
+    /// The arm as its controller takes it to be, where it stands and with the tip at its end: metres and radians.
+    pub chain: Arm,
+    /// What is off about each joint, from the base to the tip.
+    pub joints: Vec<JointErrorEstimate>,
+    /// How large errors of their kind are in this arm.
+    pub levels: ArmLevels,
+    /// What of the robot's error they do not explain, one standard deviation per axis.
+    pub unexplained: Unexplained,
+    /// The camera on its mount, to be used with corrected poses alone.
+    pub hand_eye: TransformEstimate,
+    /// The target, likewise.
+    pub target: TransformEstimate,
+    /// Covariance of the errors, radians and metres: for the joints in their order all `tilt` (x, y) and `zero`, then all `shift`
+    /// (x, y), then all `compliance`; what is null in `joints` is left out.
+    pub covariance: Vec<Vec<f64>>,
+    /// As in [`EstimateDetails`](super::EstimateDetails).
+    pub degrees_of_freedom: Option<f64>,
+    /// Likewise.
+    pub region_scale: f64,
+    /// RMS of 2-D corner residuals on views left out, pixels; `None` with too few of them.
+    pub heldout_px: Option<HeldOutByArm>,
+    /// Whether views left out are predicted worse by corrected poses, by more than chance: then do not correct.
+    pub contradicted: bool,
+}
+
+/// What is off about one joint, each with its standard deviation. What no view can tell from the two transforms is `None`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct JointErrorEstimate {
+    /// What it is called.
+    pub name: String,
+    /// Direction of its axis, rotation about x and y of its frame, degrees.
+    pub tilt_deg: Option<[f64; 2]>,
+    /// Standard deviations.
+    pub tilt_sigma_deg: Option<[f64; 2]>,
+    /// Its zero, to be added to the reported angle, degrees.
+    pub zero_deg: Option<f64>,
+    /// Standard deviation.
+    pub zero_sigma_deg: Option<f64>,
+    /// Place of its axis along x and y of its frame, millimetres.
+    pub shift_mm: Option<[f64; 2]>,
+    /// Standard deviations.
+    pub shift_sigma_mm: Option<[f64; 2]>,
+    /// What it gives way by where gravity turns it with all the weight behind it, degrees.
+    pub compliance_deg: Option<f64>,
+    /// Standard deviation.
+    pub compliance_sigma_deg: Option<f64>,
+}
+
+/// Standard deviations of the errors of this arm by their kind.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ArmLevels {
+    /// Of tilts and zeros, degrees.
+    pub angle_deg: f64,
+    /// Of shifts, millimetres.
+    pub length_mm: f64,
+    /// Of compliances, degrees.
+    pub compliance_deg: f64,
+}
+
+/// Noise of corrected tip poses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// Of the position, millimetres.
+    pub translation_mm: f64,
+    /// Of the orientation, degrees.
+    pub rotation_deg: f64,
+}
+
+/// Errors on views left out of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutByArm {
+    /// Predicted from reported poses.
+    pub reported: f64,
+    /// Predicted from corrected ones.
+    pub corrected: f64,
+}
+
+/// The one that has a place in an estimate of a joint.
+fn slot(joint: &mut JointErrorEstimate, error: LinkError) -> (&mut f64, &mut f64) {
+    fn of_pair<'a>(
+        pair: (&'a mut Option<[f64; 2]>, &'a mut Option<[f64; 2]>),
+        axis: usize,
+    ) -> (&'a mut f64, &'a mut f64) {
+        (&mut pair.0.get_or_insert([0.0; 2])[axis], &mut pair.1.get_or_insert([0.0; 2])[axis])
+    }
+    match error {
+        LinkError::TiltX => of_pair((&mut joint.tilt_deg, &mut joint.tilt_sigma_deg), 0),
+        LinkError::TiltY => of_pair((&mut joint.tilt_deg, &mut joint.tilt_sigma_deg), 1),
+        LinkError::ShiftX => of_pair((&mut joint.shift_mm, &mut joint.shift_sigma_mm), 0),
+        LinkError::ShiftY => of_pair((&mut joint.shift_mm, &mut joint.shift_sigma_mm), 1),
+        LinkError::Zero => (joint.zero_deg.get_or_insert(0.0), joint.zero_sigma_deg.get_or_insert(0.0)),
+        LinkError::Compliance => {
+            (joint.compliance_deg.get_or_insert(0.0), joint.compliance_sigma_deg.get_or_insert(0.0))
+        }
+    }
+}
+
+fn value_of(joint: &JointErrorEstimate, error: LinkError) -> Option<f64> {
+    match error {
+        LinkError::TiltX => joint.tilt_deg.map(|tilt| tilt[0]),
+        LinkError::TiltY => joint.tilt_deg.map(|tilt| tilt[1]),
+        LinkError::ShiftX => joint.shift_mm.map(|shift| shift[0]),
+        LinkError::ShiftY => joint.shift_mm.map(|shift| shift[1]),
+        LinkError::Zero => joint.zero_deg,
+        LinkError::Compliance => joint.compliance_deg,
+    }
+}
+
+/// Units of the document per unit of the estimate.
+fn shown_per_unit(error: LinkError) -> f64 {
+    match error {
+        LinkError::ShiftX | LinkError::ShiftY => 1e3,
+        _ => 180.0 / std::f64::consts::PI,
+    }
+}
+
+impl ArmEstimate {
+    /// Of a fit of the errors of an arm; `None` where that is an arm with another number of joints.
+    pub fn new(chain: &Arm, fit: &ArmFit) -> Option<Self> {
+        if chain.joint_count() != fit.errors.joint_count() {
+            return None;
+        }
+        let name = |joint: &handeye_arm::Joint| JointErrorEstimate { name: joint.name.clone(), ..Default::default() };
+        let mut joints: Vec<JointErrorEstimate> = chain.joints().iter().map(name).collect();
+        let numbers = fit.errors.values().iter().zip(fit.sigma());
+        for (parameter, (value, sigma)) in arm_parameters(chain.joint_count()).iter().zip(numbers) {
+            let shown = shown_per_unit(parameter.error);
+            let (value_at, sigma_at) = slot(&mut joints[parameter.joint], parameter.error);
+            (*value_at, *sigma_at) = (value * shown, sigma * shown);
+        }
+        let block = |at: usize| -> Matrix6<f64> { fit.covariance.fixed_view::<6, 6>(at, at).into_owned() };
+        let (hand_eye, target) = TransformEstimate::of_links(&fit.hand_eye, Some(&block(0)), Some(&block(6)));
+        let count = fit.errors.values().len();
+        let row = |i: usize| (0..count).map(|j| fit.covariance[(12 + i, 12 + j)]).collect();
+        Some(Self {
+            chain: chain.clone(),
+            joints,
+            levels: ArmLevels {
+                angle_deg: fit.noise.link_rad.to_degrees(),
+                length_mm: fit.noise.link_m * 1e3,
+                compliance_deg: fit.noise.compliance_rad.to_degrees(),
+            },
+            unexplained: Unexplained {
+                translation_mm: fit.noise.robot_m * 1e3,
+                rotation_deg: fit.noise.robot_rad.to_degrees(),
+            },
+            hand_eye,
+            target,
+            covariance: (0..count).map(row).collect(),
+            degrees_of_freedom: Some(fit.small_sample.degrees_of_freedom).filter(|value| value.is_finite()),
+            region_scale: fit.small_sample.scale,
+            heldout_px: fit.heldout_px.map(|[reported, corrected]| HeldOutByArm { reported, corrected }),
+            contradicted: fit.contradicted,
+        })
+    }
+
+    /// The arm that is corrected by it.
+    ///
+    /// # Errors
+    /// [`BadResult`] names the value that does not belong to an arm of so many joints.
+    pub fn corrected_arm(&self) -> Result<CorrectedArm, BadResult> {
+        self.check()?;
+        let parameters = arm_parameters(self.chain.joint_count());
+        let values = parameters.iter().map(|parameter| {
+            value_of(&self.joints[parameter.joint], parameter.error).unwrap_or(0.0) / shown_per_unit(parameter.error)
+        });
+        let errors = ArmErrors::new(self.chain.joint_count(), values.collect())
+            .ok_or(BadResult { at: "arm.joints".to_owned(), problem: "are not those of the chain" })?;
+        let count = parameters.len();
+        Ok(CorrectedArm {
+            arm: self.chain.clone(),
+            errors,
+            covariance: DMatrix::from_fn(count, count, |i, j| self.covariance[i][j]),
+            unexplained: (self.unexplained.translation_mm * 1e-3, self.unexplained.rotation_deg.to_radians()),
+            small_sample: SmallSample {
+                degrees_of_freedom: self.degrees_of_freedom.unwrap_or(SmallSample::KNOWN.degrees_of_freedom),
+                scale: self.region_scale,
+                ..SmallSample::KNOWN
+            },
+        })
+    }
+
+    pub(super) fn check(&self) -> Checked {
+        let parameters = arm_parameters(self.chain.joint_count());
+        require(self.joints.len() == self.chain.joint_count(), "arm.joints", "must be as many as those of the chain")?;
+        for parameter in &parameters {
+            let value = value_of(&self.joints[parameter.joint], parameter.error);
+            require(value.is_some_and(f64::is_finite), "arm.joints", "must have a number for all but the first joint")?;
+        }
+        let is_square = self.covariance.iter().all(|row| row.len() == parameters.len());
+        require(self.covariance.len() == parameters.len() && is_square, "arm.covariance", "is of another arm")?;
+        for row in &self.covariance {
+            all_finite(row, "arm.covariance")?;
+        }
+        let ArmLevels { angle_deg, length_mm, compliance_deg } = self.levels;
+        let Unexplained { translation_mm, rotation_deg } = self.unexplained;
+        for (value, at) in [
+            (angle_deg, "arm.levels.angle_deg"),
+            (length_mm, "arm.levels.length_mm"),
+            (compliance_deg, "arm.levels.compliance_deg"),
+            (translation_mm, "arm.unexplained.translation_mm"),
+            (rotation_deg, "arm.unexplained.rotation_deg"),
+        ] {
+            not_negative(Some(value), at)?;
+        }
+        require(self.region_scale > 0.0, "arm.region_scale", "must be positive")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::golden_arm;
+
+    #[test]
+    fn an_arm_comes_back_from_its_document_with_the_same_errors() {
+        let (chain, fit) = golden_arm();
+        let estimate = ArmEstimate::new(&chain, &fit).expect("six joints");
+        assert_eq!(
+            estimate.joints[0],
+            JointErrorEstimate { name: estimate.joints[0].name.clone(), ..Default::default() }
+        );
+        assert!(estimate.joints[5].zero_deg.is_none() && estimate.joints[4].zero_deg.is_some());
+        let text = serde_json::to_string(&estimate).expect("plain data");
+        let read: ArmEstimate = serde_json::from_str(&text).expect("the same");
+        let (here, there) =
+            (CorrectedArm::new(chain, &fit).expect("six joints"), read.corrected_arm().expect("of an arm"));
+        for (a, b) in here.errors.values().iter().zip(there.errors.values()) {
+            assert!((a - b).abs() < 1e-15, "{a} {b}");
+        }
+        assert_eq!(here.covariance, there.covariance);
+        let joints = [0.1, -1.2, 1.4, -1.8, -1.6, 0.2];
+        let (a, b) = (here.error_95_m(&joints).expect("six"), there.error_95_m(&joints).expect("six"));
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+
+    #[test]
+    fn a_document_of_another_arm_is_refused_by_name() {
+        let (chain, fit) = golden_arm();
+        let whole = ArmEstimate::new(&chain, &fit).expect("six joints");
+        let mut other = whole.clone();
+        other.joints.pop();
+        assert_eq!(other.corrected_arm().expect_err("five").at, "arm.joints");
+        let mut other = whole.clone();
+        other.covariance.pop();
+        assert_eq!(other.corrected_arm().expect_err("short").at, "arm.covariance");
+        let mut other = whole;
+        other.joints[2].zero_deg = None;
+        assert_eq!(other.corrected_arm().expect_err("a hole").at, "arm.joints");
+    }
+}
