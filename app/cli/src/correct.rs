@@ -16,7 +16,7 @@ use crate::{Failure, out};
 
 /// At the end of its help.
 pub const EXAMPLES: &str = "Examples:
-  handeye correct result.json wanted.csv > commands.csv
+  handeye correct result.json wanted.csv --out commands.csv
   handeye correct result.json reported.csv --from-reported --out real.csv";
 
 /// Options of `handeye correct`.
@@ -28,7 +28,7 @@ pub struct CorrectArgs {
     /// values in radians near which the arm shall be.
     table: PathBuf,
     /// The rows are joint values q1,q2,… instead, radians, and the answer is where the tip really is.
-    #[arg(long)]
+    #[arg(long, help_heading = heading::POSES)]
     from_reported: bool,
     /// Write the answer to this file instead of standard output.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]

@@ -52,7 +52,8 @@ pub(crate) fn arm_fit(
     solution: &JointSolution,
     work: &Work<'_>,
 ) -> Result<Option<ArmFit>, HandEyeError> {
-    let with = JointProblem { free: Free { arm: true, ..problem.free }, ..*problem };
+    // A target that is a thousandth larger than stated makes an arm look as much longer, by more than its own errors.
+    let with = JointProblem { free: Free { arm: true, scale: true, ..problem.free }, ..*problem };
     if with.arm().is_none() || problem.noise.is_some() {
         return Ok(None);
     }

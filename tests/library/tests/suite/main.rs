@@ -2,6 +2,7 @@
 //!
 //! `slow` is what the fast tier (`./test fast`) leaves out.
 
+mod arm_recorded;
 mod broken_datasets;
 mod camera_alone;
 mod doctor;

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3, Vector6};
 
 use super::variance::levels_of_effects;
 use super::view_block::{Layout, Own, PixelWeights, Rest, ViewBlock, add_rest, add_square, columns, prior_weight};
-use super::{DepthWeight, JointProblem, Noise};
+use super::{DepthWeight, JointProblem, Noise, SIZE_SIGMA};
 use crate::handeye::HandEyeError;
 use crate::handeye::joint::state::State;
 use handeye_geometry::progress::CancelToken;
@@ -221,7 +221,13 @@ fn priors(problem: &JointProblem<'_>, state: &State) -> Vec<SharedPrior> {
         offset,
         precision: sigma.powi(-2),
     });
-    depth.filter(|_| problem.free.depth).collect()
+    // A print is known no better than printers and rulers are, and an arm tells its size as well as it tells its own.
+    let scale = (problem.free.arm && problem.free.scale).then(|| SharedPrior {
+        index: Layout::FORM_AT + problem.free.form().scale_at(&state.intrinsics),
+        offset: state.shape.scale - 1.0,
+        precision: SIZE_SIGMA.powi(-2),
+    });
+    depth.filter(|_| problem.free.depth).chain(scale).collect()
 }
 
 fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {
