@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use crate::handeye::joint::{self, ArmErrors, Free, JointProblem, JointSolution, Noise, SmallSample, arm_parameters};
+use crate::handeye::joint::{
+    self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample, arm_parameters,
+};
 use crate::handeye::{HandEye, HandEyeError, determined};
 use crate::uncertainty::quality;
 use handeye_geometry::progress::Work;
@@ -32,6 +34,10 @@ pub struct ArmFit {
 /// Probability that views left out are predicted worse by chance, at which corrected poses are not believed.
 const WORSE_BY_CHANCE: f64 = 0.05;
 
+/// Gain of minus twice the log-likelihood, integrated over what is known of sizes beforehand, from which the size of the target is free:
+/// by chance one session in a hundred, of a target that is as stated (chi-square with one degree of freedom).
+const SIZE_GAIN: f64 = 6.63;
+
 impl ArmFit {
     /// Standard deviations of the errors, in the order of [`arm_parameters`].
     pub fn sigma(&self) -> Vec<f64> {
@@ -45,6 +51,23 @@ impl ArmFit {
     }
 }
 
+/// The same with the size of the target free, where the views ask for it: a target that is some thousandths larger than stated makes
+/// an arm look as much longer, by more than its own errors.
+fn with_shown_size<'a>(
+    stated: JointProblem<'a>,
+    fit: JointSolution,
+    work: &Work<'_>,
+) -> Result<(JointProblem<'a>, JointSolution), HandEyeError> {
+    let sized = JointProblem { free: Free { scale: true, ..stated.free }, ..stated };
+    let by_size = if stated.free.scale { None } else { determined(joint::fit(&sized, &fit.as_start(), *work))? };
+    let by_size = by_size.filter(|by_size| {
+        // The prior of the size is among the equations, but for its height.
+        let both = by_size.deviance.zip(fit.deviance);
+        both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN)
+    });
+    Ok(by_size.map_or((stated, fit), |by_size| (sized, by_size)))
+}
+
 /// The errors of the arm by the views of a joint estimate; `None` where these do not know its joints, where the noise levels are
 /// given, and where there is no answer with them.
 pub(crate) fn arm_fit(
@@ -52,12 +75,12 @@ pub(crate) fn arm_fit(
     solution: &JointSolution,
     work: &Work<'_>,
 ) -> Result<Option<ArmFit>, HandEyeError> {
-    // A target that is a thousandth larger than stated makes an arm look as much longer, by more than its own errors.
-    let with = JointProblem { free: Free { arm: true, scale: true, ..problem.free }, ..*problem };
+    let with = JointProblem { free: Free { arm: true, ..problem.free }, ..*problem };
     if with.arm().is_none() || problem.noise.is_some() {
         return Ok(None);
     }
     let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
+    let (with, fit) = with_shown_size(with, fit, work)?;
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
     let before = quality::held_out_squares_px(problem, solution, work.cancel)?;

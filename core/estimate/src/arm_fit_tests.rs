@@ -46,7 +46,9 @@ fn predicted(of: &Setup, fitted: usize) -> (ArmFit, [f64; 2]) {
 }
 
 fn with(mode: Mode, arm_error: ArmError, seed: u64) -> Setup {
-    Setup { joints: true, arm_error, ..Setup::new(mode, 40, seed) }
+    // A robot that repeats well, as industrial ones do.
+    let noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
+    Setup { joints: true, arm_error, noise, ..Setup::new(mode, 40, seed) }
 }
 
 #[test]
@@ -54,8 +56,8 @@ fn corrected_poses_predict_what_reported_ones_do_not() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::Links(LINKS), 5), 20);
         println!("{mode:?}: {reported:.3} → {corrected:.3} px, levels {:?}", arm.noise);
-        // The robot of the session, 0.1 mm and 0.02°, is a third of a pixel.
-        assert!(corrected < 0.6 * reported && corrected < 0.6, "{mode:?}: {reported} → {corrected} px");
+        // Corners and robot alone are 0.15 to 0.2 px.
+        assert!(corrected < 0.5 * reported && corrected < 0.3, "{mode:?}: {reported} → {corrected} px");
         let [before, after] = arm.heldout_px.expect("twenty views");
         assert!(after < before && !arm.contradicted, "{mode:?}: {before} → {after} px");
     }
