@@ -54,18 +54,18 @@ impl ArmFit {
 /// The same with the size of the target free, where the views ask for it: a target that is some thousandths larger than stated makes
 /// an arm look as much longer, by more than its own errors.
 fn with_shown_size<'a>(
-    stated: JointProblem<'a>,
+    stated: &JointProblem<'a>,
     fit: JointSolution,
     work: &Work<'_>,
 ) -> Result<(JointProblem<'a>, JointSolution), HandEyeError> {
-    let sized = JointProblem { free: Free { scale: true, ..stated.free }, ..stated };
+    let sized = JointProblem { free: Free { scale: true, ..stated.free }, ..*stated };
     let by_size = if stated.free.scale { None } else { determined(joint::fit(&sized, &fit.as_start(), *work))? };
     let by_size = by_size.filter(|by_size| {
         // The prior of the size is among the equations, but for its height.
         let both = by_size.deviance.zip(fit.deviance);
         both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN)
     });
-    Ok(by_size.map_or((stated, fit), |by_size| (sized, by_size)))
+    Ok(by_size.map_or((*stated, fit), |by_size| (sized, by_size)))
 }
 
 /// The errors of the arm by the views of a joint estimate; `None` where these do not know its joints, where the noise levels are
@@ -80,7 +80,7 @@ pub(crate) fn arm_fit(
         return Ok(None);
     }
     let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
-    let (with, fit) = with_shown_size(with, fit, work)?;
+    let (with, fit) = with_shown_size(&with, fit, work)?;
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
     let before = quality::held_out_squares_px(problem, solution, work.cancel)?;

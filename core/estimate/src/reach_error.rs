@@ -125,7 +125,7 @@ pub fn reach_errors(
         let mut distances: Vec<f64> = Vec::with_capacity(DRAWS * touches.len());
         for draw in &draws.0 {
             let found = way.tool_by(&pivots, &draw.errors, tool)?;
-            distances.extend(touches.iter().map(|touch| way.miss(touch, draw, tool, &found).norm()));
+            distances.extend(touches.iter().map(|touch| Way::miss(touch, draw, tool, &found).norm()));
         }
         distances.sort_by(f64::total_cmp);
         *stated = distances[((distances.len() as f64 * LEVEL) as usize).min(distances.len() - 1)];
@@ -234,7 +234,7 @@ impl Way<'_> {
     }
 
     /// From the point to the tip of the tool.
-    fn miss(&self, touch: &Touch, draw: &Possible, tool: &Vector3<f64>, found: &Vector3<f64>) -> Vector3<f64> {
+    fn miss(touch: &Touch, draw: &Possible, tool: &Vector3<f64>, found: &Vector3<f64>) -> Vector3<f64> {
         let at_view = touch.view.tip(&draw.errors) * draw.at_view;
         let point = Self::camera(&draw.hand_eye, &at_view) * touch.in_camera;
         let tip = touch.command.tip(&draw.errors) * draw.at_touch * Point3::from(*tool);

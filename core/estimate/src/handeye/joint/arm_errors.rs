@@ -271,9 +271,9 @@ mod tests {
         let chain = |errors: &ArmErrors, torques: &[f64]| {
             let mut pose = Isometry3::identity();
             let mut frames = Vec::new();
-            for j in 0..6 {
+            for (j, torque) in torques.iter().enumerate() {
                 let of_joint = arm_parameters(6).into_iter().zip(errors.values()).filter(|(p, _)| p.joint == j);
-                let error: Vector6<f64> = of_joint.map(|(p, value)| p.error.unit(torques[j]) * *value).sum();
+                let error: Vector6<f64> = of_joint.map(|(p, value)| p.error.unit(*torque) * *value).sum();
                 pose *= rest(j);
                 frames.push(pose);
                 pose *= correction_transform(&error) * motion(j);
