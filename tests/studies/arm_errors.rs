@@ -314,7 +314,7 @@ fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touc
         let seen = camera_at(&actual(&view.joints), &mount(&arm.hand_eye)) * in_camera;
         let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-corrected_tool);
         let Ok(command) = corrected.command(&Pose::from_isometry(goal), &joints) else { continue };
-        let joints: Joints = command.joints_rad.try_into().map_err(|_| "six joints")?;
+        let joints: Joints = command.joints_rad.try_into().map_err(|_wrong_count| "six joints")?;
         as_it_is += plain * plain;
         let by_way = [plain, off(cell, &joints, &truth)];
         by_command += by_way[1].powi(2);
@@ -368,7 +368,8 @@ fn cells(csv: &str) -> Result<BTreeMap<usize, (String, Chain)>, Failure> {
     let mut arms: BTreeMap<usize, (String, Vec<Link>)> = BTreeMap::new();
     for line in csv.lines().skip(1) {
         let fields: Vec<&str> = line.split(',').collect();
-        let number = |i: usize| fields.get(i).ok_or("a column is missing")?.parse::<f64>().map_err(|_| "no number");
+        let number =
+            |i: usize| fields.get(i).ok_or("a column is missing")?.parse::<f64>().map_err(|_not_a_number| "no number");
         let link = Link {
             place: Vector3::new(number(3)?, number(4)?, number(5)?),
             turn: Vector3::new(number(6)?, number(7)?, number(8)?),
@@ -377,7 +378,7 @@ fn cells(csv: &str) -> Result<BTreeMap<usize, (String, Chain)>, Failure> {
     }
     arms.into_iter()
         .map(|(arm, (model, links))| {
-            let links: [Link; 6] = links.try_into().map_err(|_| "an arm has six links")?;
+            let links: [Link; 6] = links.try_into().map_err(|_wrong_count| "an arm has six links")?;
             Ok((arm, (model, Chain(links))))
         })
         .collect()

@@ -90,24 +90,20 @@ pub struct HeldOutByArm {
     pub corrected: f64,
 }
 
-/// The one that has a place in an estimate of a joint.
+/// Where value and standard deviation of an error have their place.
 fn slot(joint: &mut JointErrorEstimate, error: LinkError) -> (&mut f64, &mut f64) {
-    fn of_pair<'a>(
-        pair: (&'a mut Option<[f64; 2]>, &'a mut Option<[f64; 2]>),
-        axis: usize,
-    ) -> (&'a mut f64, &'a mut f64) {
-        (&mut pair.0.get_or_insert([0.0; 2])[axis], &mut pair.1.get_or_insert([0.0; 2])[axis])
-    }
-    match error {
-        LinkError::TiltX => of_pair((&mut joint.tilt_deg, &mut joint.tilt_sigma_deg), 0),
-        LinkError::TiltY => of_pair((&mut joint.tilt_deg, &mut joint.tilt_sigma_deg), 1),
-        LinkError::ShiftX => of_pair((&mut joint.shift_mm, &mut joint.shift_sigma_mm), 0),
-        LinkError::ShiftY => of_pair((&mut joint.shift_mm, &mut joint.shift_sigma_mm), 1),
-        LinkError::Zero => (joint.zero_deg.get_or_insert(0.0), joint.zero_sigma_deg.get_or_insert(0.0)),
+    let JointErrorEstimate { tilt_deg, tilt_sigma_deg, shift_mm, shift_sigma_mm, .. } = joint;
+    let (values, sigmas, axis) = match error {
+        LinkError::TiltX => (tilt_deg, tilt_sigma_deg, 0),
+        LinkError::TiltY => (tilt_deg, tilt_sigma_deg, 1),
+        LinkError::ShiftX => (shift_mm, shift_sigma_mm, 0),
+        LinkError::ShiftY => (shift_mm, shift_sigma_mm, 1),
+        LinkError::Zero => return (joint.zero_deg.get_or_insert(0.0), joint.zero_sigma_deg.get_or_insert(0.0)),
         LinkError::Compliance => {
-            (joint.compliance_deg.get_or_insert(0.0), joint.compliance_sigma_deg.get_or_insert(0.0))
+            return (joint.compliance_deg.get_or_insert(0.0), joint.compliance_sigma_deg.get_or_insert(0.0));
         }
-    }
+    };
+    (&mut values.get_or_insert([0.0; 2])[axis], &mut sigmas.get_or_insert([0.0; 2])[axis])
 }
 
 fn value_of(joint: &JointErrorEstimate, error: LinkError) -> Option<f64> {
