@@ -95,8 +95,9 @@ fn middle(corrected: &CorrectedArm) -> Vec<f64> {
 }
 
 fn header(joints: usize) -> String {
-    let joints: String = (1..=joints).map(|joint| format!("q{joint},")).collect();
-    format!("{joints}x,y,z,qx,qy,qz,qw,error_95_mm\n")
+    let joints = (1..=joints).map(|joint| format!("q{joint}"));
+    let rest = ["x", "y", "z", "qx", "qy", "qz", "qw", "error_95_mm"].map(str::to_owned);
+    joints.chain(rest).collect::<Vec<_>>().join(",") + "\n"
 }
 
 fn row(text: &mut String, joints_rad: &[f64], pose: &Pose<Base, Tip>, error_95_m: f64) {
