@@ -3,9 +3,14 @@ use serde_json::{Value, json};
 use super::testing::*;
 use super::*;
 
+/// A result of every kind.
+fn of_every_kind() -> Vec<CalibrationResult> {
+    vec![golden(), eye_to_hand(), intrinsics_only(), pose_pairs_only(), CalibrationResult::default()]
+}
+
 #[test]
 fn a_result_reads_back_bit_for_bit() {
-    for result in vec![golden(), eye_to_hand(), intrinsics_only(), pose_pairs_only(), CalibrationResult::default()] {
+    for result in of_every_kind() {
         let text = result.to_json().expect("text");
         assert_eq!(CalibrationResult::from_json(&text).expect("result"), result);
     }
@@ -101,7 +106,7 @@ fn a_result_file_reads_back_and_a_missing_one_is_bad_input() {
 fn every_kind_of_result_fits_the_schema_and_nothing_else_does() {
     let schema: Value =
         serde_json::from_str(include_str!("../../../assets/schema/handeye-calibration-1.schema.json")).expect("JSON");
-    for result in vec![golden(), eye_to_hand(), intrinsics_only(), pose_pairs_only(), CalibrationResult::default()] {
+    for result in of_every_kind() {
         let value = serde_json::to_value(&result).expect("JSON");
         assert_eq!(schema_violation(&schema, &schema, &value, "$"), None);
     }
