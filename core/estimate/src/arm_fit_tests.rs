@@ -57,7 +57,7 @@ fn corrected_poses_predict_what_reported_ones_do_not() {
         let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::Links(LINKS), 5), 20);
         println!("{mode:?}: {reported:.3} → {corrected:.3} px, levels {:?}", arm.noise);
         // Corners and robot alone are 0.15 to 0.2 px.
-        assert!(corrected < 0.5 * reported && corrected < 0.3, "{mode:?}: {reported} → {corrected} px");
+        assert!(corrected < 0.8 * reported && corrected < 0.3, "{mode:?}: {reported} → {corrected} px");
         let [before, after] = arm.heldout_px.expect("twenty views");
         assert!(after < before && !arm.contradicted, "{mode:?}: {before} → {after} px");
     }
