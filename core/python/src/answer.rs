@@ -19,7 +19,6 @@ type PairSigmas = Option<(f64, f64)>;
 /// The result document as JSON, and the disagreement of pose pairs.
 #[pyfunction]
 #[pyo3(signature = (observations, method, keep_outliers, free_scale, goal_mm, progress))]
-#[expect(clippy::too_many_arguments, reason = "the wrapper in Python has names for them")]
 pub fn calibrate(
     py: Python<'_>,
     observations: &Bound<'_, Observations>,
