@@ -107,3 +107,51 @@ fn row(text: &mut String, joints_rad: &[f64], pose: &Pose<Base, Tip>, error_95_m
     }
     let _infallible = writeln!(text, "{:.3}", error_95_m * 1e3);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(path: &std::path::Path) -> Vec<f64> {
+        let text = std::fs::read_to_string(path).expect("an answer");
+        let row = text.lines().nth(1).expect("a row");
+        row.split(',').map(|word| word.parse().expect("a number")).collect()
+    }
+
+    #[test]
+    fn the_joints_of_a_command_take_the_tip_where_it_was_wanted_and_what_is_wrong_names_its_row() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        let result = handeye_result::testing::golden();
+        std::fs::write(at("result.json"), result.to_json().expect("plain data")).expect("written");
+        let arm = result.arm.as_ref().expect("golden").corrected_arm().expect("an arm");
+        let tip = arm.arm.forward(&[0.3, -1.3, 1.7, -1.9, -1.6, 0.4]).expect("six joints");
+        let (t, [qx, qy, qz, qw]) = (tip.translation(), tip.xyzw());
+        let wanted = format!(
+            "x,y,z,qx,qy,qz,qw,q1,q2,q3,q4,q5,q6\n{},{},{},{qx},{qy},{qz},{qw},0.3,-1.3,1.7,-1.9,-1.6,0.4\n",
+            t.x, t.y, t.z
+        );
+        std::fs::write(at("wanted.csv"), &wanted).expect("written");
+        let arguments = |table: &str, from_reported: bool, out: &str| CorrectArgs {
+            calibration: at("result.json"),
+            table: at(table),
+            from_reported,
+            out: Some(at(out).into_os_string().into()),
+        };
+        run(&arguments("wanted.csv", false, "commands.csv")).expect("within reach");
+        let command = numbers(&at("commands.csv"));
+        assert_eq!(command.len(), 6 + 7 + 1);
+        assert!((command[6] - t.x).abs() > 1e-5, "the errors are seen");
+        let joints: Vec<String> = command[..6].iter().map(f64::to_string).collect();
+        std::fs::write(at("reported.csv"), format!("q1,q2,q3,q4,q5,q6\n{}\n", joints.join(","))).expect("written");
+        run(&arguments("reported.csv", true, "real.csv")).expect("joints");
+        let real = numbers(&at("real.csv"));
+        for (a, b) in real[6..9].iter().zip(t.iter()) {
+            assert!((a - b).abs() < 1e-8, "{real:?} {t}");
+        }
+        std::fs::write(at("far.csv"), wanted.replacen(&format!("\n{}", t.x), "\n9", 1)).expect("written");
+        let error = run(&arguments("far.csv", false, "none.csv")).expect_err("out of reach");
+        assert!(format!("{error}").contains("far.csv, row 2"), "{error}");
+        assert!(!at("none.csv").exists());
+    }
+}

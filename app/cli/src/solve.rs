@@ -67,7 +67,7 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
         let sha256 = dataset.input_sha256().map_err(Failure::unusable)?;
         let placement = dataset.arm.as_ref().and_then(|arm| arm.placement.as_ref().ok());
         let arm = placement.map(|placement| ArmOfViews {
-            arm: placement.arm.clone(),
+            placement: placement.clone(),
             joints_rad: dataset.entries.iter().map(|entry| entry.joints_rad.clone()).collect(),
         });
         let seen = SessionObservations { observations, captures, verification: Vec::new(), arm };

@@ -2,13 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::handeye::joint::{
-    self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample, arm_parameters,
-};
+use crate::handeye::joint::{self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample};
 use crate::handeye::{HandEye, HandEyeError, determined};
 use crate::uncertainty::quality;
 use handeye_geometry::progress::Work;
-use handeye_geometry::statistics::better_by_chance;
 
 /// The errors of the robot's arm as the views show them, and the calibration by the tip poses that they make. Both transforms are
 /// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
@@ -31,23 +28,14 @@ pub struct ArmFit {
     pub contradicted: bool,
 }
 
-/// Probability that views left out are predicted worse by chance, at which corrected poses are not believed.
-const WORSE_BY_CHANCE: f64 = 0.05;
-
 /// Gain of minus twice the log-likelihood, integrated over what is known of sizes beforehand, from which the size of the target is free:
 /// by chance one session in a hundred, of a target that is as stated (chi-square with one degree of freedom).
 const SIZE_GAIN: f64 = 6.63;
 
 impl ArmFit {
-    /// Standard deviations of the errors, in the order of [`arm_parameters`].
+    /// Standard deviations of the errors, in the order of [`arm_parameters`](joint::arm_parameters).
     pub fn sigma(&self) -> Vec<f64> {
         (12..self.covariance.nrows()).map(|i| self.covariance[(i, i)].max(0.0).sqrt()).collect()
-    }
-
-    /// Standard deviation of each error before any data, by the level of its kind.
-    pub fn levels(&self) -> Vec<f64> {
-        let levels = [self.noise.link_rad, self.noise.link_m, self.noise.compliance_rad];
-        arm_parameters(self.errors.joint_count()).iter().map(|parameter| levels[parameter.error.kind()]).collect()
     }
 }
 
@@ -83,15 +71,7 @@ pub(crate) fn arm_fit(
     let (with, fit) = with_shown_size(&with, fit, work)?;
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
-    let before = quality::held_out_squares_px(problem, solution, work.cancel)?;
-    let after = quality::held_out_squares_px(&with, &fit, work.cancel)?;
-    let heldout = before.zip(after);
-    let corners: usize = problem.views.iter().map(|view| view.corners.len()).sum();
-    let rms_px = |squares: &[f64]| (squares.iter().sum::<f64>() / corners as f64).sqrt();
-    let contradicted = heldout.as_ref().is_some_and(|(before, after)| {
-        let losses: Vec<f64> = before.iter().zip(after).map(|(before, after)| after - before).collect();
-        losses.iter().sum::<f64>() > 0.0 && better_by_chance(&losses) < WORSE_BY_CHANCE
-    });
+    let heldout = quality::compared((problem, solution), (&with, &fit), work.cancel)?;
     let count = errors.values().len();
     let first = fit.covariance.nrows() - count;
     let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
@@ -101,8 +81,8 @@ pub(crate) fn arm_fit(
         covariance: fit.covariance.select_rows(&kept).select_columns(&kept),
         small_sample: fit.small_sample,
         noise: fit.noise,
-        heldout_px: heldout.map(|(before, after)| [rms_px(&before), rms_px(&after)]),
-        contradicted,
+        heldout_px: heldout.map(|heldout| [heldout.before_px, heldout.after_px]),
+        contradicted: heldout.is_some_and(|heldout| heldout.is_worse),
     }))
 }
 

@@ -59,6 +59,11 @@ pub const DISTANCE_LIMIT_M: f64 = 0.010;
 /// The same for the rotation, radians.
 pub const ROTATION_LIMIT_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 
+/// How far reported poses may be from those of the chain that they come from, metres: they are written to a tenth of a millimetre.
+const ROUNDED_M: f64 = 1e-4;
+/// The same for the rotation, radians: to a hundredth of a degree.
+const ROUNDED_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
+
 /// The robot in one view: the reported pose of the tip, and the joint values in radians (of a prismatic joint in metres).
 #[derive(Debug, Clone, Copy)]
 pub struct JointView<'a> {
@@ -100,6 +105,14 @@ impl Placement {
             return Err(PlacementError::PrismaticOffset { joint: i + 1, name: joints[i].name.clone() });
         }
         Ok(self.arm.tip_from_joints(&view.base_from_tip, view.joints_rad)?)
+    }
+
+    /// The arm, where the reported poses are those of its own chain; `None` where the controller counts with another one, such as its
+    /// factory calibration. Errors that are found beside reported poses are then not those of this chain.
+    pub fn arm_of_poses(&self) -> Option<&Arm> {
+        let count = self.misses.len().max(1) as f64;
+        let rms_rad = (self.misses.iter().map(|miss| miss.1 * miss.1).sum::<f64>() / count).sqrt();
+        (self.rms_m() <= ROUNDED_M && rms_rad <= ROUNDED_RAD).then_some(&self.arm)
     }
 
     /// Root mean square of the distances, metres.

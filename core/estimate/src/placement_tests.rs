@@ -72,6 +72,7 @@ fn poses_and_joint_angles_tell_where_the_arm_stands_and_what_its_tool_is() {
     assert!(apart(&placement.arm.flange_from_tip, &arm.flange_from_tip) < 1e-9);
     let (rms_m, worst_rad) = (placement.rms_m(), placement.misses.iter().map(|miss| miss.1).fold(0.0, f64::max));
     assert!(rms_m < 1e-9 && worst_rad < 1e-7, "acos near 1 has half the digits");
+    assert_eq!(placement.arm_of_poses(), Some(&placement.arm));
     placement.check().expect("they belong together");
 
     let (_, frames) = place_checked(&model_ur5(), &views(&arm, &joints)).expect("they belong together");
@@ -99,6 +100,7 @@ fn the_nominal_arm_passes_for_one_with_its_own_calibration() {
     let placement = place(&nominal, &views(&real, &joints)).expect("placed");
     assert!(placement.rms_m() > 1e-4, "the arms differ");
     placement.check().expect("close enough for derivatives");
+    assert_eq!(placement.arm_of_poses(), None, "its controller counts with another chain");
 }
 
 #[test]

@@ -63,10 +63,12 @@ pub struct ReachErrors {
 }
 
 /// One way of going about it: by reported poses, or by corrected ones.
-struct Way<'a> {
+struct Way {
     hand_eye: HandEye,
-    /// What the way takes the tip to be off: nothing where it is by reported poses.
-    believed: &'a ArmErrors,
+    /// The arm as the way takes it to be: without errors where it is by reported poses.
+    arm: CorrectedArm,
+    /// The mean z axis of the tip over the views, in the base.
+    axis: Vector3<f64>,
 }
 
 /// A touch by one way.
@@ -108,8 +110,9 @@ pub fn reach_errors(
     target: &TargetSpec,
     tool: &Vector3<f64>,
 ) -> Option<ReachErrors> {
-    let nothing = ArmErrors::none(fit.errors.joint_count());
-    let ways = [Way { hand_eye: *answer, believed: &nothing }, Way { hand_eye: fit.hand_eye, believed: &fit.errors }];
+    let as_it_is = CorrectedArm { errors: ArmErrors::none(fit.errors.joint_count()), ..arm.clone() };
+    let axis = mean_axis(&arm.arm, views)?;
+    let ways = [Way { hand_eye: *answer, arm: as_it_is, axis }, Way { hand_eye: fit.hand_eye, arm: arm.clone(), axis }];
     let mut random = Draw::new(SEED);
     let planned = planned(views, target, &mut random);
     let turns: Vec<UnitQuaternion<f64>> =
@@ -117,11 +120,11 @@ pub fn reach_errors(
     let draws = Draws::new(fit, &mut random)?;
     let mut stated = [0.0; 2];
     for (stated, way) in stated.iter_mut().zip(&ways) {
-        let touches: Vec<Touch> = planned.iter().filter_map(|plan| way.touch(arm, views, plan, tool)).collect();
+        let touches: Vec<Touch> = planned.iter().filter_map(|plan| way.touch(views, plan, tool)).collect();
         if 4 * touches.len() < TOUCHES {
             return None;
         }
-        let pivots = way.pivots(arm, &touches[0], &turns, views, tool);
+        let pivots = way.pivots(&touches[0], &turns, views, tool);
         let mut distances: Vec<f64> = Vec::with_capacity(DRAWS * touches.len());
         for draw in &draws.0 {
             let found = way.tool_by(&pivots, &draw.errors, tool)?;
@@ -155,7 +158,7 @@ fn planned(views: &[Seen], target: &TargetSpec, random: &mut Draw) -> Vec<Plan> 
     if views.is_empty() || points.is_empty() { Vec::new() } else { (0..TOUCHES).map(plan).collect() }
 }
 
-impl Way<'_> {
+impl Way {
     /// Where the camera is when the tip is there.
     fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isometry3<f64> {
         match hand_eye {
@@ -164,46 +167,43 @@ impl Way<'_> {
         }
     }
 
-    fn touch(&self, arm: &CorrectedArm, views: &[Seen], plan: &Plan, tool: &Vector3<f64>) -> Option<Touch> {
+    fn touch(&self, views: &[Seen], plan: &Plan, tool: &Vector3<f64>) -> Option<Touch> {
         let seen = &views[plan.view];
-        let view = At::new(&arm.arm, &seen.joints_rad)?;
+        let view = At::new(&self.arm.arm, &seen.joints_rad)?;
         let in_camera = seen.camera_from_target.isometry() * plan.point;
-        let base_from_tip = view.tip(self.believed);
+        let base_from_tip = view.tip(&self.arm.errors);
         let base_from_camera = Self::camera(&self.hand_eye, &base_from_tip);
         let along = match self.hand_eye.mode() {
             // A target's z axis points away from who looks at it.
             Mode::EyeInHand => base_from_camera.rotation * seen.camera_from_target.isometry().rotation,
-            Mode::EyeToHand => facing(&mean_axis(arm, views)?),
+            Mode::EyeToHand => facing(&self.axis),
         };
         let turn = along * plan.turn;
         let point = base_from_camera * in_camera;
         let goal = Isometry3::from_parts((point.coords - turn * tool).into(), turn);
-        let joints = self.joints(arm, &goal, &seen.joints_rad)?;
-        Some(Touch { view, command: At::new(&arm.arm, &joints)?, in_camera, turn })
+        Some(Touch { view, command: self.at(&goal, &seen.joints_rad)?, in_camera, turn })
     }
 
-    /// Joint values that take the tip there as the way takes it to be.
-    fn joints(&self, arm: &CorrectedArm, goal: &Isometry3<f64>, near: &[f64]) -> Option<Vec<f64>> {
-        let by_way = CorrectedArm { errors: self.believed.clone(), ..arm.clone() };
-        by_way.command(&Pose::from_isometry(*goal), near).ok().map(|command| command.joints_rad)
+    /// The arm commanded to a goal as the way takes it to be.
+    fn at(&self, goal: &Isometry3<f64>, near: &[f64]) -> Option<At> {
+        let command = self.arm.command(&Pose::from_isometry(*goal), near).ok()?;
+        At::new(&self.arm.arm, &command.joints_rad)
     }
 
     /// The arm at turns about the point of a touch.
     fn pivots(
         &self,
-        arm: &CorrectedArm,
         touch: &Touch,
         turns: &[UnitQuaternion<f64>],
         views: &[Seen],
         tool: &Vector3<f64>,
     ) -> Vec<(At, UnitQuaternion<f64>)> {
-        let tip = touch.command.tip(self.believed);
+        let tip = touch.command.tip(&self.arm.errors);
         let point = tip * Point3::from(*tool);
         let at = |turn: &UnitQuaternion<f64>| {
             let turn = touch.turn * turn;
             let goal = Isometry3::from_parts((point.coords - turn * tool).into(), turn);
-            let joints = self.joints(arm, &goal, &views[0].joints_rad)?;
-            Some((At::new(&arm.arm, &joints)?, turn))
+            Some((self.at(&goal, &views[0].joints_rad)?, turn))
         };
         turns.iter().filter_map(at).collect()
     }
@@ -219,7 +219,7 @@ impl Way<'_> {
     ) -> Option<Vector3<f64>> {
         let (mut information, mut right) = (Matrix6::zeros(), Vector6::zeros());
         for (at, turn) in pivots {
-            let believed_from_true = at.tip(self.believed).inverse() * at.tip(errors);
+            let believed_from_true = at.tip(&self.arm.errors).inverse() * at.tip(errors);
             let place = (believed_from_true * Point3::from(*tool)).coords;
             let mut row = Matrix3x6::zeros();
             row.fixed_columns_mut::<3>(0).copy_from(turn.to_rotation_matrix().matrix());
@@ -288,8 +288,8 @@ impl Draws {
 }
 
 /// The mean z axis of the tip over the views, in the base.
-fn mean_axis(arm: &CorrectedArm, views: &[Seen]) -> Option<Vector3<f64>> {
-    let axes = views.iter().filter_map(|seen| Some(arm.arm.forward(&seen.joints_rad).ok()?.rotation() * Vector3::z()));
+fn mean_axis(arm: &Arm, views: &[Seen]) -> Option<Vector3<f64>> {
+    let axes = views.iter().filter_map(|seen| Some(arm.forward(&seen.joints_rad).ok()?.rotation() * Vector3::z()));
     axes.sum::<Vector3<f64>>().try_normalize(1e-9)
 }
 

@@ -23,7 +23,6 @@ use crate::uncertainty::overdispersion::Overdispersion;
 use crate::uncertainty::{overdispersion, quality};
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::progress::Work;
-use handeye_geometry::statistics::better_by_chance;
 use handeye_geometry::targets::TargetSpec;
 use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
 use handeye_geometry::targets::observation::{Corners, View};
@@ -276,12 +275,9 @@ fn printed(
     Ok(if is_bent { shown } else { Some((print, solution)) })
 }
 
-/// Probability that views left out are predicted worse by chance, below which they are worse: one session in twenty goes without
-/// depths that are right. That is cheap, and depths that are not harm.
-const WORSE_BY_CHANCE: f64 = 0.05;
-
 /// Tries the depths of the views, and takes them unless they make predictions of held-out views worse by more than chance. That
-/// they make them better is seldom seen: they tell what corners do not.
+/// they make them better is seldom seen: they tell what corners do not. One session in twenty goes without depths that are right,
+/// which is cheap, and depths that are not harm.
 fn depths(
     problem: &JointProblem<'_>,
     screened: &mut Screened,
@@ -292,14 +288,9 @@ fn depths(
     let Some(found) = with_depths(&without, &screened.solution, work.cancel)? else { return Ok(None) };
     let free = found.solution.free;
     let with = JointProblem { free, depth: Some(found.weight), ..without };
-    let before = quality::held_out_squares_px(&without, &screened.solution, work.cancel)?;
-    let after = quality::held_out_squares_px(&with, &found.solution, work.cancel)?;
-    let (Some(before), Some(after)) = (before, after) else { return Ok(None) };
-    let corners: usize = views.iter().map(|view| view.corners.len()).sum();
-    let rms_px = |squares: &[f64]| (squares.iter().sum::<f64>() / corners as f64).sqrt();
-    let (heldout_before_px, heldout_after_px) = (rms_px(&before), rms_px(&after));
-    let losses: Vec<f64> = before.iter().zip(&after).map(|(before, after)| after - before).collect();
-    let accepted = better_by_chance(&losses) >= WORSE_BY_CHANCE;
+    let compared = quality::compared((&without, &screened.solution), (&with, &found.solution), work.cancel)?;
+    let Some(heldout) = compared else { return Ok(None) };
+    let accepted = !heldout.is_worse;
     let depths = DepthsInFit {
         views: found.views,
         noise_m: found.solution.noise.corner_px / found.weight.px_per_m,
@@ -307,8 +298,8 @@ fn depths(
         other_probability: found.other.probability,
         bias: found.open.0,
         covariance: found.open.1,
-        heldout_before_px,
-        heldout_after_px,
+        heldout_before_px: heldout.before_px,
+        heldout_after_px: heldout.after_px,
         accepted,
     };
     if accepted {

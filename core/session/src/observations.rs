@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use super::capture_id::CaptureId;
 use super::document::{Document, Role};
-use handeye_arm::Arm;
 use handeye_dataset::CameraInput;
 use handeye_estimate::placement::{Placement, PlacementError};
 use handeye_estimate::{Observations, ObservedView};
@@ -27,8 +26,8 @@ pub struct SessionObservations {
 /// An arm and its joints in the views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmOfViews {
-    /// Where the views put it.
-    pub arm: Arm,
+    /// Where the views put it, and how far from them.
+    pub placement: Placement,
     /// Its joint values in each view, radians; `None` where a view has none.
     pub joints_rad: Vec<Option<Vec<f64>>>,
 }
@@ -57,7 +56,7 @@ impl Document {
             },
             captures: Vec::new(),
             verification: Vec::new(),
-            arm: placement.map(|placement| ArmOfViews { arm: placement.arm, joints_rad: Vec::new() }),
+            arm: placement.map(|placement| ArmOfViews { placement, joints_rad: Vec::new() }),
         };
         for capture in &self.captures {
             let sight = sights(capture.id);

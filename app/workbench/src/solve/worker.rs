@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use handeye_arm::Arm;
 use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_estimate::diagnose::{Calibration, examine};
@@ -100,10 +101,18 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
     if let Some((of_views, errors)) =
         job.arm.as_ref().zip(calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()))
     {
-        result.arm = ArmEstimate::new(&of_views.arm, errors);
-        if let Some(reach) = reach(job, &calibration, of_views, errors) {
-            result.quality.reach_error_95_mm = Some(reach.as_it_is_95_m * 1e3);
-            result.quality.reach_error_corrected_95_mm = Some(reach.corrected_95_m * 1e3);
+        if let Some(arm) = of_views.placement.arm_of_poses() {
+            result.arm = ArmEstimate::new(arm, errors);
+            // What views left out contradict is not promised.
+            let reach = reach(job, &calibration, arm, (of_views, errors)).filter(|_| !errors.contradicted);
+            result.quality.reach_error_95_mm = reach.map(|reach| reach.as_it_is_95_m * 1e3);
+            result.quality.reach_error_corrected_95_mm = reach.map(|reach| reach.corrected_95_m * 1e3);
+        } else {
+            tracing::warn!(
+                "the reported poses are {:.3} mm RMS from those of the arm by its joint angles: the controller counts with another \
+                 chain, such as its factory calibration, and no commands are corrected",
+                of_views.placement.rms_m() * 1e3
+            );
         }
     }
     if let Some(truth) = &job.truth {
@@ -138,9 +147,14 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
 }
 
 /// How near a tool arrives; `None` where the error of the calibration cannot be stated either.
-fn reach(job: &SolveJob, calibration: &Calibration, of_views: &ArmOfViews, errors: &ArmFit) -> Option<ReachErrors> {
+fn reach(
+    job: &SolveJob,
+    calibration: &Calibration,
+    arm: &Arm,
+    (of_views, errors): (&ArmOfViews, &ArmFit),
+) -> Option<ReachErrors> {
     calibration.tip_error_95_m()?;
-    let arm = CorrectedArm::new(of_views.arm.clone(), errors)?;
+    let arm = CorrectedArm::new(arm.clone(), errors)?;
     let seen = calibration.views.iter().zip(&of_views.joints_rad).filter_map(|(view, joints_rad)| {
         let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
         Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })

@@ -2,8 +2,7 @@
 //!
 //! An arm whose links are not as its controller takes them to be is off by amounts that change smoothly over its
 //! workspace. To first order the error of the tip, in its own axes, is an affine function of its place in the base. The
-//! constant part is taken up by the hand-eye transform and the target's pose; the eighteen slopes are random effects with
-//! two variances of their own, position and orientation, which are found as those of the noise are (restricted maximum
+//! eighteen slopes are random effects with two variances of their own, position and orientation, which are found as those of the noise are (restricted maximum
 //! likelihood). Without them a smooth error of the arm is taken for noise that is independent from view to view, and the
 //! stated uncertainty is too small; or it looks like a board that moved, a target of another size or a wrong lens. Where
 //! the data show none, the model goes without.

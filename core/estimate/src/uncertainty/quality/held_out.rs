@@ -9,7 +9,8 @@ use crate::handeye::motion::MIN_VIEWS;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::planar_pose::refine::refine;
-use handeye_geometry::progress::{Stage, Work};
+use handeye_geometry::progress::{CancelToken, Stage, Work};
+use handeye_geometry::statistics::better_by_chance;
 use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
 use handeye_geometry::targets::observation::{Corner, View};
 use handeye_geometry::view_equations::{ViewInput, Whitener};
@@ -118,17 +119,36 @@ impl Squares {
 /// come about by chance four times in a thousand: with fewer nothing is shown so.
 pub const BY_CHANCE: f64 = 5e-3;
 
-/// Squared errors over the corners of every view \[px²\], predicted as by [`held_out`], to compare models view by view.
+/// Probability that views left out are predicted worse by chance, at which they are.
+const WORSE_BY_CHANCE: f64 = 0.05;
+
+/// Two models of the same views, by the views that they leave out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Compared {
+    /// RMS of 2-D corner residuals by the first, pixels.
+    pub before_px: f64,
+    /// By the second.
+    pub after_px: f64,
+    /// Whether the second predicts worse, by more than chance: signed ranks of the squares view by view, once in twenty.
+    pub is_worse: bool,
+}
+
+/// Compares two estimates from the same views, predicted as by [`held_out`]; `None` where one of them cannot be.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
-pub fn held_out_squares_px<'a>(
-    problem: &JointProblem<'_>,
-    solution: &JointSolution,
-    work: impl Into<Work<'a>>,
-) -> Result<Option<Vec<f64>>, HandEyeError> {
-    let by_view = predicted_by_view(problem, solution, work.into())?;
-    Ok(by_view.map(|views| views.iter().map(|of_view| of_view.px).collect()))
+pub(crate) fn compared(
+    before: (&JointProblem<'_>, &JointSolution),
+    after: (&JointProblem<'_>, &JointSolution),
+    cancel: &CancelToken,
+) -> Result<Option<Compared>, HandEyeError> {
+    let predicted = |(problem, solution)| predicted_by_view(problem, solution, cancel.into());
+    let (Some(first), Some(second)) = (predicted(before)?, predicted(after)?) else { return Ok(None) };
+    let corners: usize = before.0.views.iter().map(|view| view.corners.len()).sum();
+    let rms_px = |views: &[Squares]| (views.iter().map(|view| view.px).sum::<f64>() / corners as f64).sqrt();
+    let losses: Vec<f64> = first.iter().zip(&second).map(|(before, after)| after.px - before.px).collect();
+    let is_worse = better_by_chance(&losses) < WORSE_BY_CHANCE;
+    Ok(Some(Compared { before_px: rms_px(&first), after_px: rms_px(&second), is_worse }))
 }
 
 /// Squares of one view predicted from its reported robot pose; `None` when a point falls behind the camera.
@@ -186,7 +206,6 @@ mod tests {
     use crate::handeye::Mode;
     use crate::handeye::joint::{Noise, estimate, fit};
     use crate::test_sessions::Estimated as _;
-    use handeye_geometry::progress::CancelToken;
     use handeye_simulate::session::{camera, trial};
 
     /// Views that stayed in the fit would be predicted too well, and nobody would see it.
