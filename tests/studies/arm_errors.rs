@@ -1,11 +1,13 @@
 //! What the errors of an arm do to a touched point, and what is left of them once the command is corrected.
 //!
-//!     cargo run --release -p handeye_studies --example arm_errors -- [CSV] [VIEWS] [lens]
+//!     cargo run --release -p handeye_studies --example arm_errors -- [CSV] [VIEWS] [lens] [exact]
 //!
 //! The arms are those of the factory calibrations in the CSV (its columns: `arm, model, link, x_m, y_m, z_m, roll_rad, pitch_rad,
 //! yaw_rad`): the arm moves by them, and its controller believes the numbers of the data sheet. Corners have 0.1 px of noise, the
 //! arm repeats to 0.02 mm and 0.005°. A tool of 120 mm, whose tip was found by the same arm about one point, is sent down to points
-//! that the camera saw; the distance between the two is printed, RMS over 40 points a session, one session an arm and a set-up.
+//! that the camera saw; the distance between the two is printed, RMS over 40 points a session, one session an arm and a set-up. Beside it
+//! stands what a point in space is off by the hand-eye transform alone, and what is stated of that; what no view can tell from the
+//! transform (the arm's first joint, the zero of its last) is no error of it. With `exact` the arms are as their data sheets have them.
 //! Nothing of the truth comes from the estimator: chains, lens and noise are written out here or in `handeye_simulate`.
 
 use std::collections::BTreeMap;
@@ -14,6 +16,7 @@ use std::process::ExitCode;
 use handeye_arm::{Arm, ArmKind};
 use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::handeye::joint::ArmErrors;
 use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_estimate::placement::{JointView, place_checked};
 use handeye_estimate::reach_error::{Seen, reach_errors};
@@ -26,7 +29,9 @@ use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_simulate::lens;
 use handeye_simulate::links::{noise_twist, normal, shift_and_turn};
 use handeye_simulate::session::{Cone, camera};
-use nalgebra::{Isometry3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{
+    DMatrix, DVector, Isometry3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6,
+};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -238,6 +243,53 @@ struct Touched {
     corrected_mm: f64,
     within: [f64; 2],
     stated_mm: [f64; 2],
+    /// Error of a point where the board was seen by the transform alone, and what is stated of it.
+    space_mm: f64,
+    space_stated_mm: f64,
+}
+
+/// Where the transform of a perfect calibration is: that of the cell, but for what belongs to the gauge. With `A` the arm as it is and
+/// `F` as it is believed, `A(q) = Z F_e(q) T` with errors `e` of the joints between; `T` goes with the tip, and `Z` with the base.
+fn true_mount_from_camera(cell: &Cell, arm: &Arm, rng: &mut ChaCha8Rng) -> Option<Isometry3<f64>> {
+    const CONFIGURATIONS: usize = 40;
+    let rigid = |x: &[f64]| shift_and_turn(&Vector6::from_column_slice(x));
+    let configurations: Vec<Joints> =
+        (0..CONFIGURATIONS).map(|_| std::array::from_fn(|_| rng.random_range(-3.0..3.0))).collect();
+    let count = ArmErrors::none(6).values().len();
+    let off = |x: &[f64]| -> Option<DVector<f64>> {
+        let errors = ArmErrors::new(6, x[12..].to_vec())?;
+        let mut off = Vec::with_capacity(6 * CONFIGURATIONS);
+        for joints in &configurations {
+            let pose = arm.forward(joints).ok()?;
+            let tip =
+                pose.isometry() * errors.true_tip(&pose, &arm.tip_from_joints(&pose, joints).ok()?).reported_from_true;
+            let miss = cell.really(joints).inverse() * rigid(&x[..6]) * tip * rigid(&x[6..12]);
+            off.extend(miss.translation.vector.iter().chain(miss.rotation.scaled_axis().iter()));
+        }
+        Some(DVector::from_vec(off))
+    };
+    let mut x = vec![0.0; 12 + count];
+    for _ in 0..8 {
+        let here = off(&x)?;
+        let columns = (0..x.len()).map(|k| {
+            let mut moved = x.clone();
+            moved[k] += 1e-6;
+            Some((off(&moved)? - &here) / 1e-6)
+        });
+        let by = DMatrix::from_columns(&columns.collect::<Option<Vec<_>>>()?);
+        // What is compliance here is none: its columns are almost those of other errors.
+        let normal = by.transpose() * &by + DMatrix::identity(x.len(), x.len()) * 1e-9;
+        let step = normal.lu().solve(&(by.transpose() * here))?;
+        x.iter_mut().zip(step.iter()).for_each(|(x, step)| *x -= step);
+    }
+    if off(&x)?.amax() > 1e-5 {
+        return None;
+    }
+    let (base, tip) = (rigid(&x[..6]), rigid(&x[6..12]));
+    Some(match cell.mode {
+        Mode::EyeInHand => tip * cell.camera,
+        Mode::EyeToHand => base.inverse() * cell.camera,
+    })
 }
 
 fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touched, Failure> {
@@ -270,6 +322,7 @@ fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touc
     };
     let calibration = calibrate(&observations, Method::Joint, &CancelToken::default())?;
     let arm = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()).ok_or("no arm was estimated")?;
+    let true_camera = true_mount_from_camera(cell, &placement.arm, &mut rng).ok_or("no gauge")?;
     let corrected = CorrectedArm::new(placement.arm, arm).ok_or("another arm")?;
     if std::env::var_os("VERBOSE").is_some() {
         report(&calibration, arm);
@@ -278,6 +331,8 @@ fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touc
         |joints: &Joints| corrected.actual(joints).map_or_else(|_| Isometry3::identity(), |pose| *pose.isometry());
     let believed = |joints: &Joints| cell.believed.forward(joints);
     let hand_eye = calibration.hand_eye.ok_or("no answer")?;
+    let board = calibration.joint.as_ref().ok_or("no joint estimate")?.reference_point;
+    let space_m = (hand_eye.mount_from_camera().isometry() * board - true_camera * board).norm();
     let plain_tool = tool_by(cell, believed, &mut rng).ok_or("no tool")?;
     let corrected_tool = tool_by(cell, actual, &mut rng).ok_or("no tool")?;
     let seen: Vec<Seen> = taken
@@ -329,6 +384,8 @@ fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touc
         corrected_mm: rms_mm(by_command),
         within: within.map(|within| within / count),
         stated_mm: stated.map(|m| m * 1e3),
+        space_mm: space_m * 1e3,
+        space_stated_mm: calibration.tip_error_95_m().map_or(f64::NAN, |m| m * 1e3),
     })
 }
 
@@ -421,26 +478,28 @@ fn run() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let csv = std::fs::read_to_string(arguments.first().ok_or("which CSV of arms?")?)?;
     let views: usize = arguments.get(1).map_or(Ok(20), |text| text.parse())?;
-    let free_lens = arguments.get(2).is_some_and(|text| text == "lens");
+    let given = |word: &str| arguments.iter().skip(2).any(|argument| argument == word);
+    let (free_lens, exact) = (given("lens"), given("exact"));
     for (name, mode) in [("camera on the arm", Mode::EyeInHand), ("camera beside the arm", Mode::EyeToHand)] {
         let arms = cells(&csv)?;
         let sessions: Vec<_> = arms
             .into_par_iter()
             .filter_map(|(arm, (model, truth))| {
+                let truth = if exact { Chain::nominal(&model)? } else { truth };
                 let cell = cell(&model, truth, mode)?;
                 Some((arm, model, session(&cell, views, free_lens, 100 + arm as u64)))
             })
             .collect();
         println!(
-            "\n{name}, {views} views\n\n| arm | as it is mm | corrected mm | stated 95 % | within |\n| --- | --- | --- | --- | --- |"
+            "\n{name}, {views} views\n\n| arm | as it is mm | corrected mm | stated 95 % | within | in space mm | stated 95 % |\n| --- | --- | --- | --- | --- | --- | --- |"
         );
         let (mut plain, mut corrected, mut worse) = (Vec::new(), Vec::new(), 0);
-        let mut all_within = [0.0; 2];
+        let (mut all_within, mut in_space) = ([0.0; 2], Vec::new());
         for (arm, model, touched) in sessions {
             match touched {
-                Ok(Touched { as_it_is_mm, corrected_mm, within, stated_mm }) => {
+                Ok(Touched { as_it_is_mm, corrected_mm, within, stated_mm, space_mm, space_stated_mm }) => {
                     println!(
-                        "| {arm} {model} | {as_it_is_mm:.3} | {corrected_mm:.3} | {:.2}, {:.2} | {:.0} %, {:.0} % |",
+                        "| {arm} {model} | {as_it_is_mm:.3} | {corrected_mm:.3} | {:.2}, {:.2} | {:.0} %, {:.0} % | {space_mm:.3} | {space_stated_mm:.3} |",
                         stated_mm[0],
                         stated_mm[1],
                         within[0] * 100.0,
@@ -450,6 +509,7 @@ fn run() -> Result<(), Failure> {
                     plain.push(as_it_is_mm);
                     corrected.push(corrected_mm);
                     worse += usize::from(corrected_mm > as_it_is_mm);
+                    in_space.push((space_mm, space_stated_mm));
                 }
                 Err(error) => println!("| {arm} {model} | {error} | |"),
             }
@@ -464,6 +524,13 @@ fn run() -> Result<(), Failure> {
             plain.len(),
             all_within[0] / plain.len() as f64 * 100.0,
             all_within[1] / plain.len() as f64 * 100.0
+        );
+        println!(
+            "in space {:.3}, stated {:.3}, {} of {} within",
+            median(in_space.iter().map(|(error, _)| *error)).unwrap_or(f64::NAN),
+            median(in_space.iter().map(|(_, stated)| *stated)).unwrap_or(f64::NAN),
+            in_space.iter().filter(|(error, stated)| error <= stated).count(),
+            in_space.len()
         );
     }
     Ok(())

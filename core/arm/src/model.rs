@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Arm, ArmError, DhRow};
 
-/// An arm as a data set or a session names it: `{"kind": "ur5"}` or `{"dh": [[a, alpha, d, theta], …]}`.
+/// An arm as a session names it: `{"kind": "ur5"}`, `{"dh": [[a, alpha, d, theta], …]}` or `{"chain": {…}}`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ArmModel {
@@ -13,6 +13,8 @@ pub enum ArmModel {
     /// Rows of Denavit and Hartenberg in the standard convention: `[a, alpha, d, theta]`, where theta is added to the
     /// joint angle; metres and radians.
     Dh(Vec<[f64; 4]>),
+    /// One that was read from a URDF file or from a cell.
+    Chain(Box<Arm>),
 }
 
 /// An arm that is built in. Those of Universal Robots are as their manufacturer's table has them, with the joint angles
@@ -71,6 +73,7 @@ impl ArmModel {
                 let rows: Vec<_> = rows.iter().map(|&row| DhRow::new(row)).collect();
                 Arm::from_dh(&rows)
             }
+            Self::Chain(arm) => Ok(Arm::clone(arm)),
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use handeye_arm::ArmError;
+use handeye_arm::urdf::UrdfError;
 use handeye_geometry::se3::NotARotation;
 use handeye_images::ImageFileError;
 use handeye_wording::Text;
@@ -108,6 +109,9 @@ pub enum DatasetProblem {
     /// An arm that is none.
     #[error("[robot.arm]: {0}")]
     Arm(ArmError),
+    /// Or a URDF without one.
+    #[error("[robot.arm]: {0}")]
+    Urdf(UrdfError),
     /// A key of another kind of target.
     #[error("{key} does not belong to a target of kind {kind:?}: remove it, or check the kind")]
     ForeignKey {

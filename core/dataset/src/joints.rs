@@ -1,12 +1,16 @@
 //! Joint angles of a data set: their columns, the arm they belong to, and what they are good for.
 
+use std::ops::Range;
+
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::Entry;
 use super::error::DatasetProblem;
+use crate::text::TextFile;
 use crate::value::{AngleUnit, Spanning, bad};
-use handeye_arm::{ArmKind, ArmModel, MAX_JOINTS};
+use handeye_arm::urdf::Urdf;
+use handeye_arm::{Arm, ArmKind, ArmModel, MAX_JOINTS};
 use handeye_estimate::placement::{self, JointView, Placement, PlacementError, TipFromJoints};
 
 /// The columns of joint angles, after those of the rotation.
@@ -19,6 +23,44 @@ pub(super) const COLUMNS: [&str; MAX_JOINTS] =
 pub(super) struct RawArm {
     kind: Option<ArmKind>,
     dh: Option<Vec<[f64; 4]>>,
+    /// A file of the data set.
+    urdf: Option<String>,
+    /// Links of that file.
+    base: Option<String>,
+    tip: Option<String>,
+    /// As a session's own data set has it.
+    chain: Option<Box<Arm>>,
+}
+
+/// An arm as `[robot.arm]` names it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum NamedArm {
+    Model(ArmModel),
+    Urdf { file: String, base: Option<String>, tip: Option<String>, span: Range<usize> },
+}
+
+impl NamedArm {
+    /// The file that it is in.
+    pub(super) fn file(&self) -> Option<&String> {
+        match self {
+            Self::Model(_) => None,
+            Self::Urdf { file, .. } => Some(file),
+        }
+    }
+
+    /// The arm, out of its `file` where it is in one; checked for the number of its joints.
+    pub(super) fn model(&self, file: Option<&TextFile>, joints: usize) -> Result<ArmModel, Spanning> {
+        match (self, file) {
+            (Self::Urdf { base, tip, span, .. }, Some(file)) => {
+                let read = Urdf::parse(&file.text, &file.path.display().to_string());
+                let arm = read.and_then(|urdf| urdf.arm(base.as_deref(), tip.as_deref()));
+                let arm = arm.map_err(|error| (span.clone(), DatasetProblem::Urdf(error)))?;
+                counted(ArmModel::Chain(Box::new(arm)), joints, span)
+            }
+            (Self::Urdf { file, span, .. }, None) => Err((span.clone(), DatasetProblem::Unreadable(file.clone()))),
+            (Self::Model(model), _) => Ok(model.clone()),
+        }
+    }
 }
 
 /// What `[robot]` says of joint angles.
@@ -27,7 +69,7 @@ pub(super) struct JointColumns {
     /// How many columns there are.
     pub count: usize,
     pub unit: AngleUnit,
-    pub arm: Option<ArmModel>,
+    pub arm: Option<NamedArm>,
 }
 
 /// Checks what `[robot]` says of joint angles; `None` when it says nothing.
@@ -35,7 +77,7 @@ pub(super) fn joint_columns(
     joints: Option<&Spanned<i64>>,
     unit: Option<AngleUnit>,
     arm: Option<&Spanned<RawArm>>,
-    whole: std::ops::Range<usize>,
+    whole: Range<usize>,
 ) -> Result<Option<JointColumns>, Spanning> {
     let missing = |span, key, why| (span, DatasetProblem::MissingKey { table: "robot", key, why });
     let Some(joints) = joints else {
@@ -57,22 +99,32 @@ pub(super) fn joint_columns(
     let Some(unit) = unit else {
         return Err(missing(joints.span(), "joint_unit", "joint angles are in \"rad\" or \"deg\""));
     };
-    let arm = arm.map(|raw| arm_model(raw, count)).transpose()?;
+    let arm = arm.map(|raw| named_arm(raw, count)).transpose()?;
     Ok(Some(JointColumns { count, unit, arm }))
 }
 
-fn arm_model(raw: &Spanned<RawArm>, joints: usize) -> Result<ArmModel, Spanning> {
-    let at = |problem| (raw.span(), problem);
-    let model = match raw.get_ref() {
-        RawArm { kind: Some(kind), dh: None } => ArmModel::Kind(*kind),
-        RawArm { kind: None, dh: Some(rows) } => ArmModel::Dh(rows.clone()),
-        RawArm { .. } => return Err(at(DatasetProblem::Conflict("[robot.arm] has either kind or dh"))),
-    };
-    let need = model.arm().map_err(|error| at(DatasetProblem::Arm(error)))?.joint_count();
-    if joints != need {
-        return Err(at(DatasetProblem::JointCount { got: joints, need }));
+fn named_arm(raw: &Spanned<RawArm>, joints: usize) -> Result<NamedArm, Spanning> {
+    let conflict = |why| Err((raw.span(), DatasetProblem::Conflict(why)));
+    let RawArm { kind, dh, urdf, base, tip, chain } = raw.get_ref();
+    if urdf.is_none() && (base.is_some() || tip.is_some()) {
+        return conflict("[robot.arm] has base and tip, which are links of a URDF, and no urdf: name the file");
     }
-    Ok(model)
+    let model = match (kind, dh, urdf, chain) {
+        (Some(kind), None, None, None) => ArmModel::Kind(*kind),
+        (None, Some(rows), None, None) => ArmModel::Dh(rows.clone()),
+        (None, None, None, Some(chain)) => ArmModel::Chain(chain.clone()),
+        (None, None, Some(file), None) => {
+            return Ok(NamedArm::Urdf { file: file.clone(), base: base.clone(), tip: tip.clone(), span: raw.span() });
+        }
+        _ => return conflict("[robot.arm] has one of kind, dh, urdf and chain"),
+    };
+    counted(model, joints, &raw.span()).map(NamedArm::Model)
+}
+
+fn counted(model: ArmModel, joints: usize, span: &Range<usize>) -> Result<ArmModel, Spanning> {
+    let at = |problem| (span.clone(), problem);
+    let need = model.arm().map_err(|error| at(DatasetProblem::Arm(error)))?.joint_count();
+    if joints == need { Ok(model) } else { Err(at(DatasetProblem::JointCount { got: joints, need })) }
 }
 
 /// The arm of a data set, and how well joint angles and reported poses fit together with it.

@@ -30,8 +30,20 @@ fn tip(joints_rad: &[f64; 6]) -> Pose<Base, Tip> {
 
 /// A data set without images, with the lines of `[robot]` about joints and a table of joint angles.
 fn read(robot: &str, header: &str, joints: &[[f64; 6]]) -> Result<Dataset, String> {
+    read_with(robot, header, joints, &[])
+}
+
+/// The same with more files.
+fn read_with(robot: &str, header: &str, joints: &[[f64; 6]], files: &[(&str, &str)]) -> Result<Dataset, String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("write");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("in a folder")).expect("a folder");
+        fs::write(path, text).expect("write");
+    };
+    for (name, text) in files {
+        write(name, text);
+    }
     let mut table = format!("image,x,y,z,qx,qy,qz,qw{header}\n");
     for (i, (deg, cells)) in JOINTS_DEG.iter().zip(joints).enumerate() {
         let tip = tip(&radians(deg));
@@ -95,6 +107,78 @@ fn the_rows_of_an_arm_do_as_well_as_its_name() {
                 .all(|(a, b)| { (tip_by_joint(a) - tip_by_joint(b)).norm() < 1e-9 })
         );
         assert_eq!(a.tip_from_joints.len(), 6);
+    }
+}
+
+/// The same arm as a URDF without a tool, and with a gripper beside its tip.
+fn urdf() -> String {
+    let arm = ArmModel::Kind(ArmKind::Ur5Coppeliasim).arm().expect("built in");
+    let mut text = "<robot name=\"ur5\"><link name=\"l0\"/>".to_owned();
+    let origin = |at: &nalgebra::Isometry3<f64>| {
+        let (t, (roll, pitch, yaw)) = (at.translation, at.rotation.euler_angles());
+        format!("<origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>", t.x, t.y, t.z)
+    };
+    for (i, joint) in arm.joints().iter().enumerate() {
+        let (at, axis) = (origin(&joint.previous_from_joint), joint.axis);
+        write!(
+            text,
+            "<link name=\"l{}\"/><joint name=\"j{i}\" type=\"continuous\"><parent link=\"l{i}\"/><child link=\"l{}\"/>{at}\
+             <axis xyz=\"{} {} {}\"/></joint>",
+            i + 1,
+            i + 1,
+            axis.x,
+            axis.y,
+            axis.z
+        )
+        .expect("text");
+    }
+    let at =
+        origin(&arm.frames(&[0.0; 6]).map(|at| at.base_from_link[5].inverse() * at.base_from_flange).expect("six"));
+    let fixed = |name: &str, at: &str| {
+        format!(
+            "<link name=\"{name}\"/><joint name=\"to_{name}\" type=\"fixed\"><parent link=\"l6\"/><child link=\"{name}\"/>{at}</joint>"
+        )
+    };
+    format!("{text}{}{}</robot>", fixed("flange", &at), fixed("gripper", ""))
+}
+
+#[test]
+fn a_urdf_of_the_data_set_does_as_well_and_the_chain_comes_back_from_what_a_session_writes() {
+    let of = |arm: &str| format!("joints = 6\njoint_unit = \"deg\"\n[robot.arm]\n{arm}");
+    let with_urdf = |arm: &str| read_with(&of(arm), SIX, &JOINTS_DEG, &[("robots/ur5.urdf", &urdf())]);
+    let read_urdf = with_urdf("urdf = \"robots/ur5.urdf\"\ntip = \"flange\"\n").expect("a URDF");
+    let by_name = read(UR5, SIX, &JOINTS_DEG).expect("a name");
+    let agree = |a: &Dataset, b: &Dataset| {
+        assert!(a.arm.as_ref().expect("an arm").placement.as_ref().expect("it fits").rms_m() < 1e-8);
+        for (a, b) in a.entries.iter().zip(&b.entries) {
+            let pairs = a.tip_from_joints.iter().zip(&b.tip_from_joints);
+            assert!(
+                a.tip_from_joints.len() == 6
+                    && pairs.map(|(a, b)| tip_by_joint(a) - tip_by_joint(b)).all(|d| d.norm() < 1e-8)
+            );
+        }
+    };
+    agree(&read_urdf, &by_name);
+    assert!(read_urdf.text_files().any(|(name, _)| name == "robots/ur5.urdf"), "it is part of the input");
+    let model = &read_urdf.arm.as_ref().expect("an arm").model;
+    let written = crate::write::description(
+        handeye_estimate::handeye::Mode::EyeInHand,
+        &read_urdf.target,
+        None,
+        Some(crate::write::Joints::Of(model)),
+    );
+    let robot = written.split_once("joints = 6").expect("joints").1.replace("\"rad\"", "\"deg\"");
+    let back = read(&format!("joints = 6{robot}"), SIX, &JOINTS_DEG).unwrap_or_else(|why| panic!("{why}\n{written}"));
+    assert_eq!(&back.arm.expect("an arm").model, model);
+    for (arm, why) in [
+        ("urdf = \"robots/none.urdf\"\n", "none.urdf"),
+        ("urdf = \"robots/ur5.urdf\"\n", "robots/ur5.urdf"),
+        ("urdf = \"robots/ur5.urdf\"\ntip = \"l4\"\n", "joints = 6, but the arm of [robot.arm] has 4"),
+        ("kind = \"ur5\"\ntip = \"flange\"\n", "name the file"),
+        ("kind = \"ur5\"\nurdf = \"robots/ur5.urdf\"\n", "one of kind, dh, urdf and chain"),
+    ] {
+        let error = with_urdf(arm).expect_err(why);
+        assert!(error.contains(why), "{error}");
     }
 }
 

@@ -144,6 +144,11 @@ impl Dataset {
         let poses_file = table(&config.robot.as_ref().map(|r| r.poses.clone()))?;
         let corners_file = table(&config.corners)?;
         let target_poses_file = table(&config.target_poses)?;
+        let joints = config.robot.as_ref().and_then(|robot| robot.joints.as_ref());
+        let named_arm = joints.and_then(|joints| Some((joints.arm.as_ref()?, joints.count)));
+        let arm_file = table(&named_arm.and_then(|(arm, _)| arm.file().cloned()))?;
+        let arm = named_arm.map(|(arm, joints)| arm.model(arm_file.as_ref(), joints)).transpose();
+        let arm = arm.map_err(|(span, problem)| description.error_at(span.start, problem))?;
 
         let views = views(folder, &config, poses_file.as_ref(), &description.path)?;
         let mut corners = corners_file.as_ref().map(|file| corners::read_corners(file, &config.target)).transpose()?;
@@ -188,10 +193,10 @@ impl Dataset {
                 row: view.row,
             });
         }
-        let joints = config.robot.as_ref().and_then(|robot| robot.joints.as_ref());
-        let arm = joints.and_then(|joints| joints.arm.clone()).map(|model| DatasetArm::of(model, &mut out));
-        let files = [Some(&description), poses_file.as_ref(), corners_file.as_ref(), target_poses_file.as_ref()];
-        let files: Vec<&TextFile> = files.into_iter().flatten().collect();
+        let arm = arm.map(|model| DatasetArm::of(model, &mut out));
+        let tables = [&poses_file, &corners_file, &target_poses_file, &arm_file];
+        let files: Vec<&TextFile> =
+            [Some(&description)].into_iter().chain(tables.map(Option::as_ref)).flatten().collect();
         let text_files = files.iter().map(|file| file.name.display().to_string()).collect();
         #[cfg(feature = "digest")]
         let text_sha256 = files.iter().map(|file| file.sha256).collect();

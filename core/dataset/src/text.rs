@@ -49,6 +49,11 @@ impl TextFile {
             sha256,
         })
     }
+
+    /// An error about what is at a byte of it.
+    pub fn error_at(&self, offset: usize, problem: DatasetProblem) -> DatasetError {
+        DatasetError::new(&self.path, Some(line_of(self.text.as_bytes(), offset)), problem)
+    }
 }
 
 /// The line of a byte, counted from 1.

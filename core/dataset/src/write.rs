@@ -1,5 +1,6 @@
 //! The files of a dataset folder as text. What is written here, [`super::Dataset::read`] reads to the same numbers.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::CameraInput;
@@ -69,12 +70,17 @@ pub fn description_of_images<'a>(
 }
 
 /// The rest of `[robot]`, and `[robot.arm]`.
-fn arm_table(arm: &ArmModel) -> String {
-    let (joints, what) = match arm {
-        ArmModel::Kind(kind) => (arm.arm().map_or(0, |arm| arm.joint_count()), format!("kind = \"{}\"", kind.name())),
-        ArmModel::Dh(rows) => (rows.len(), format!("dh = {rows:?}")),
+fn arm_table(model: &ArmModel) -> String {
+    let joints = model.arm().map_or(0, |arm| arm.joint_count());
+    let table = match model {
+        ArmModel::Kind(kind) => format!("[robot.arm]\nkind = \"{}\"\n", kind.name()),
+        ArmModel::Dh(rows) => format!("[robot.arm]\ndh = {rows:?}\n"),
+        ArmModel::Chain(arm) => {
+            let tables = BTreeMap::from([("robot", BTreeMap::from([("arm", BTreeMap::from([("chain", arm)]))]))]);
+            toml::to_string(&tables).expect("an arm is names and numbers, which TOML has")
+        }
     };
-    format!("{}\n[robot.arm]\n{what}\n", joint_columns(joints))
+    format!("{}\n{table}", joint_columns(joints))
 }
 
 /// The columns of joint values; with radians the metres of a prismatic joint stay as they are.

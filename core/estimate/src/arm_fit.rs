@@ -1,11 +1,13 @@
 //! The arm's own errors within a calibration: what they are, and the transforms that go with them.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix6};
 
 use crate::handeye::joint::{self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample};
 use crate::handeye::{HandEye, HandEyeError, determined};
+use crate::stated_uncertainty::Alternative;
 use crate::uncertainty::quality;
 use handeye_geometry::progress::Work;
+use handeye_geometry::se3;
 
 /// The errors of the robot's arm as the views show them, and the calibration by the tip poses that they make. Both transforms are
 /// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
@@ -36,6 +38,17 @@ impl ArmFit {
     /// Standard deviations of the errors, in the order of [`arm_parameters`](joint::arm_parameters).
     pub fn sigma(&self) -> Vec<f64> {
         (12..self.covariance.nrows()).map(|i| self.covariance[(i, i)].max(0.0).sqrt()).collect()
+    }
+
+    /// What it says of both links of a calibration by reported poses, which knows nothing of the arm's errors: the camera on its mount,
+    /// and the target.
+    pub fn of_links(&self, answer: &HandEye) -> [Alternative; 2] {
+        let shifts = [
+            se3::log((answer.mount_from_camera().inverse() * self.hand_eye.mount_from_camera()).isometry()),
+            se3::log((answer.anchor_from_target().inverse() * self.hand_eye.anchor_from_target()).isometry()),
+        ];
+        let covariance = |at: usize| -> Matrix6<f64> { self.covariance.fixed_view::<6, 6>(at, at).into_owned() };
+        std::array::from_fn(|link| Alternative { shift: shifts[link], covariance: covariance(6 * link) })
     }
 }
 

@@ -4,11 +4,11 @@
 //! board of another size, a lens that was given wrongly, a board that slipped), the answer is off by what that
 //! explanation would move it; that is added to the error. Where the data contradict themselves no error is stated.
 
-use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::handeye::joint::SmallSample;
 use crate::uncertainty::quality::tip_error_95_at;
-use handeye_geometry::se3;
+use handeye_geometry::{point_error, se3};
 
 /// Which error may be stated.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,8 +33,26 @@ pub struct Alternative {
 impl Alternative {
     /// How far it moves a `point` (camera coordinates, metres), metres.
     pub fn moved_m(&self, point: &Point3<f64>) -> f64 {
+        self.moved(point).norm()
+    }
+
+    fn moved(&self, point: &Point3<f64>) -> Vector3<f64> {
         let shift: Isometry3<f64> = se3::exp(&self.shift);
-        (shift * point - point).norm()
+        shift * point - point
+    }
+
+    /// The length that the error of a `point` by the answer as it is stays under with a probability of 95 % where this is the truth,
+    /// metres: of a vector with this mean and this covariance. The smaller of two bounds, both at most a tenth too large: mean and
+    /// radius after one another, which is near where the mean is large, and the radius of the mean square, where it is small.
+    pub fn error_95_m(&self, law: SmallSample, point: &Point3<f64>) -> f64 {
+        let (mean, covariance) = (self.moved(point), point_error::covariance(&self.covariance, point));
+        let mean_square = covariance + mean * mean.transpose();
+        (mean.norm() + law.radius_95(&covariance)).min(law.radius_95(&mean_square))
+    }
+
+    /// Mean square of the error of the answer as it is where this is the truth, `[t; r]`.
+    pub fn mean_square(&self) -> Matrix6<f64> {
+        self.covariance + self.shift * self.shift.transpose()
     }
 }
 
@@ -80,6 +98,35 @@ mod tests {
 
     fn isotropic(sigma_m: f64) -> Matrix6<f64> {
         Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)) * sigma_m * sigma_m
+    }
+
+    /// Against drawn vectors.
+    #[test]
+    fn the_error_under_an_alternative_is_that_of_a_vector_with_a_mean_and_at_most_a_tenth_larger() {
+        use crate::handeye::draw::Draw;
+        let point = Point3::new(0.0, 0.0, 0.5);
+        for (axes, mean) in [
+            ([1.0, 1.0, 1.0], 0.0),
+            ([1.0, 1.0, 1.0], 1.0),
+            ([1.0, 0.1, 0.1], 1.0),
+            ([0.3, 1.0, 0.1], 2.0),
+            ([1.0, 0.1, 0.1], 5.0),
+            ([0.2, 0.2, 1.0], 10.0),
+        ] {
+            let mut random = Draw::new(7);
+            let mut lengths: Vec<f64> = (0..40_000)
+                .map(|_| Vector3::from_fn(|i, _| axes[i] * random.normal() + if i == 0 { mean } else { 0.0 }).norm())
+                .collect();
+            lengths.sort_by(f64::total_cmp);
+            let drawn_m = lengths[38_000] * 1e-3;
+            let [x, y, z] = axes.map(|axis| axis * axis * 1e-6);
+            let alternative = Alternative {
+                shift: Vector6::new(mean * 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0),
+                covariance: Matrix6::from_diagonal(&Vector6::new(x, y, z, 0.0, 0.0, 0.0)),
+            };
+            let ratio = alternative.error_95_m(SmallSample::KNOWN, &point) / drawn_m;
+            assert!((0.985..1.11).contains(&ratio), "{axes:?} {mean}: {ratio}");
+        }
     }
 
     #[test]

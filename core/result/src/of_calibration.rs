@@ -69,8 +69,9 @@ impl CalibrationResult {
             ..Self::default()
         };
         if let Some(links) = &calibration.hand_eye {
-            let covariances = calibration.link_covariances.as_ref();
-            result.set_links(links, covariances.map(|c| &c.hand_eye), covariances.map(|c| &c.target));
+            let covariances = calibration.link_covariances();
+            let [hand_eye, target] = [covariances.map(|c| c.hand_eye), covariances.map(|c| c.target)];
+            result.set_links(links, hand_eye.as_ref(), target.as_ref());
         }
         result
     }

@@ -44,15 +44,16 @@ pub(super) fn named(name: &str) -> SeriesLines {
 /// The calibration that `known` has just learnt.
 pub(super) fn write(pen: Pen<'_>, known: &Known, solved: &Solved) -> Result<(), RecordError> {
     let calibration = &solved.calibration;
+    let links = calibration.link_covariances();
     write_camera(pen, known, known.camera())?;
     if let Some(board) = known.board() {
         if let Some(target) = &board.shape {
             write_board(pen, known, Some(board))?;
             let path = paths::board(known.mode());
             pen.write(&below(path, paths::CORNERS), &board_points(target, style::ESTIMATED))?;
-            write_uncertainty(pen, path, calibration.link_covariances.as_ref().map(|links| &links.target))?;
+            write_uncertainty(pen, path, links.as_ref().map(|links| &links.target))?;
         }
-        write_uncertainty(pen, paths::camera(known.mode()), calibration.hand_eye_covariance())?;
+        write_uncertainty(pen, paths::camera(known.mode()), links.as_ref().map(|links| &links.hand_eye))?;
     }
     number(pen, paths::PLOT_RMS, calibration.rms_px)?;
     number(pen, paths::PLOT_HELDOUT, calibration.joint.as_ref().and_then(|joint| joint.heldout_rms_px))?;

@@ -7,21 +7,24 @@ use handeye_coppeliasim::cell::ArmKinematics;
 use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_session::{GroundTruth, SessionMeta};
+use nalgebra::Isometry3;
 
 use crate::model::Truth;
 
 /// The board of the reference scene.
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
-/// The arm whose kinematics is built in, of which a cell tells whether it is its own.
-const BUILT_IN_ARM: ArmModel = ArmModel::Kind(ArmKind::Ur5Coppeliasim);
-
 /// The ten reference poses, so that they are there wherever the binary is.
 pub const REFERENCE_POSES: &str = include_str!("../../../../assets/poses/seed10.toml");
 
-/// The arm whose joint values the estimate of the arm's errors may use: of any other the values are kept and not used.
+/// The arm of a cell, as its own kinematics has it. That of an arm with prismatic joints is of no use to an estimate of its errors.
 pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {
-    kinematics.filter(|arm| arm.is_ur5()).map(|_ur5| BUILT_IN_ARM)
+    let of = |it: &ArmKinematics| {
+        // Where it stands and what its tool is follows from the captures.
+        let arm = || it.arm().clone().mounted(Isometry3::identity(), Isometry3::identity());
+        if it.is_ur5() { ArmModel::Kind(ArmKind::Ur5Coppeliasim) } else { ArmModel::Chain(Box::new(arm())) }
+    };
+    kinematics.filter(|it| it.kinds().all(|kind| kind == JointKind::Revolute)).map(of)
 }
 
 /// How the joints of an arm move, where a session has to say so: where they are others than six that turn.

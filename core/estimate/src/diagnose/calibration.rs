@@ -30,9 +30,11 @@ use nalgebra::Point3;
 
 use super::doctor::{self, Diagnosis};
 use super::findings::FindingOptions;
-use crate::handeye::HandEyeError;
-use crate::stated_uncertainty::StatedUncertainty;
-use crate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, resolution};
+use crate::handeye::joint::SmallSample;
+use crate::handeye::{HandEyeError, Mode};
+use crate::stated_uncertainty::{Alternative, StatedUncertainty};
+use crate::{self as estimate, CalibrateError, Fit, LinkCovariances, Method, Observations, Options, resolution};
+use handeye_geometry::point_error;
 use handeye_geometry::progress::Work;
 
 /// A fit, what was found about it, and the error that may be stated for it.
@@ -105,15 +107,38 @@ impl Calibration {
     }
 
     /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
-    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. Of the joint estimate
-    /// only, and `None` when the data contradict themselves.
+    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. With a camera on an arm whose joints
+    /// are known it is that of the camera on the arm as it really is; beside an arm, by the poses that it reports where the views are.
+    /// Of the joint estimate only, and `None` when the data contradict themselves.
     pub fn tip_error_95_m(&self) -> Option<f64> {
         self.error_95_m(&self.joint.as_ref()?.reference_point)
     }
 
     /// The same at any `point`, camera coordinates in metres.
     pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
-        self.stated.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)
+        let by_poses = self.stated.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)?;
+        let by_arm = self.of_links_by_arm().map(|([hand_eye, _], law)| hand_eye.error_95_m(law, point));
+        Some(by_arm.map_or(by_poses, |by_arm| by_poses.max(by_arm)))
+    }
+
+    /// What the errors of the arm say of both links, and how their errors are distributed; `None` where its joints are not known, and
+    /// where views left out contradict them. `None` of a camera beside the arm, too: an arm shifts all that it reports in a part of its
+    /// workspace alike, and the camera with it, so that it meets what the camera sees there.
+    fn of_links_by_arm(&self) -> Option<([Alternative; 2], SmallSample)> {
+        let arm = self.joint.as_ref()?.arm.as_ref().filter(|arm| !arm.contradicted)?;
+        let answer = self.hand_eye.as_ref().filter(|answer| answer.mode() == Mode::EyeInHand)?;
+        Some((arm.of_links(answer), arm.small_sample))
+    }
+
+    /// Covariances of the two rigid links as they may be stated: those of the fit, or with a camera on an arm whose joints are known the
+    /// mean squares of what they are off on the arm as it really is, whichever makes the larger error of a measured point.
+    pub fn link_covariances(&self) -> Option<LinkCovariances> {
+        let by_poses = self.fit.link_covariances?;
+        let Some(point) = self.joint.as_ref().map(|joint| joint.reference_point) else { return Some(by_poses) };
+        let by_arm = self.of_links_by_arm().map(|(links, _)| links.map(|link| link.mean_square()));
+        let by_arm = by_arm.map(|[hand_eye, target]| LinkCovariances { hand_eye, target });
+        let size = |links: &LinkCovariances| point_error::covariance(&links.hand_eye, &point).trace();
+        Some(by_arm.filter(|by_arm| size(by_arm) > size(&by_poses)).unwrap_or(by_poses))
     }
 
     /// How far what was found and the answer does not count on would move a point where the camera saw the target, metres: a

@@ -99,7 +99,7 @@ impl Predictor {
                 .and_then(|joint| joint.print.as_ref())
                 .map_or_else(Vec::new, |it| it.errors_m.clone()),
             field: joint.and_then(|joint| joint.field.clone()),
-            hand_eye_covariance: calibration.hand_eye_covariance().copied(),
+            hand_eye_covariance: calibration.link_covariances().map(|links| links.hand_eye),
             small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
             uncertainty,
         })

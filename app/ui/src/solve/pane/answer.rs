@@ -46,11 +46,11 @@ pub fn answer_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     parts::hint_ui(ui, meaning);
     let law = solved.calibration.joint.as_ref().map_or(SmallSample::KNOWN, |joint| joint.small_sample);
     // With something found that is not in the model the covariance is no error of the answer.
-    let covariance = solved.calibration.hand_eye_covariance();
+    let covariance = solved.calibration.link_covariances().map(|links| links.hand_eye);
     let covariance_withheld =
         covariance.is_some() && *solved.calibration.stated_uncertainty() != StatedUncertainty::AsModelled;
     let covariance = covariance.filter(|_| !covariance_withheld);
-    let within = covariance.map(|c| Within95::new(&pose, c, law));
+    let within = covariance.map(|c| Within95::new(&pose, &c, law));
     let deg = |radians: [f64; 3]| radians.map(f64::to_degrees);
     parts::stated_ui(ui, "x y z [mm]", &numbers::row(translation_mm.as_slice(), 3, 9));
     if let Some(within) = &within {

@@ -59,11 +59,11 @@ pub fn against_truth(model: &Model, solved: &Solved) -> Option<AgainstTruth> {
     });
     let stated = solved
         .calibration
-        .hand_eye_covariance()
+        .link_covariances()
         .filter(|_| *solved.calibration.stated_uncertainty() == StatedUncertainty::AsModelled);
-    let is_within = stated.and_then(|covariance| {
+    let is_within = stated.and_then(|covariances| {
         let error = se3::log((found.inverse() * truth).isometry());
-        let weighted = Cholesky::new(*covariance)?.solve(&error);
+        let weighted = Cholesky::new(covariances.hand_eye)?.solve(&error);
         Some(error.dot(&weighted) <= CHI_SQUARE_6_95)
     });
     Some(AgainstTruth { at_board_m, is_within })
