@@ -32,6 +32,7 @@ mod sample;
 mod shared;
 mod solve;
 pub(crate) mod target;
+mod tool_arg;
 mod towards_board;
 mod track;
 

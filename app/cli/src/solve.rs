@@ -9,6 +9,7 @@ use handeye_dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
 use handeye_estimate::diagnose::doctor::diagnose;
 use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions};
 use handeye_estimate::handeye::{HandEyeError, Mode};
+use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::{CalibrateError, Method, Observations, ObservedView, Options};
 use handeye_export::{ExportInput, ExportNames};
 use handeye_geometry::progress::CancelToken;
@@ -68,6 +69,7 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
         let placement = dataset.arm.as_ref().and_then(|arm| arm.placement.as_ref().ok());
         let arm = placement.map(|placement| ArmOfViews {
             placement: placement.clone(),
+            tool_m: dataset.tool_m.unwrap_or([0.0, 0.0, USUAL_TOOL_M]),
             joints_rad: dataset.entries.iter().map(|entry| entry.joints_rad.clone()).collect(),
         });
         let seen = SessionObservations { observations, captures, verification: Vec::new(), arm };
@@ -190,17 +192,27 @@ impl Solution {
     }
 }
 
-/// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it.
-/// `goal_m` is the expected error (95 %) to reach, metres; the truth is only compared with.
-pub fn folder(
-    path: &Path,
-    method: Method,
-    options: Options,
-    goal_m: f64,
-    truth: Option<Truth>,
-    cancel: &CancelToken,
-) -> Result<Solution, Failure> {
-    let input = read(path, cancel)?;
+/// What is wanted of the answer for a folder.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// Which answer.
+    pub method: Method,
+    /// What is changed about it.
+    pub options: Options,
+    /// The expected error (95 %) to reach, metres.
+    pub goal_m: f64,
+    /// Where the tip of the tool is in the frame of the tip, metres, instead of where the folder has it.
+    pub tool_m: Option<[f64; 3]>,
+}
+
+/// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it; the truth
+/// is only compared with.
+pub fn folder(path: &Path, wanted: Wanted, truth: Option<Truth>, cancel: &CancelToken) -> Result<Solution, Failure> {
+    let mut input = read(path, cancel)?;
+    let Wanted { method, options, goal_m, tool_m } = wanted;
+    if let (Some(arm), Some(tool_m)) = (&mut input.seen.arm, tool_m) {
+        arm.tool_m = tool_m;
+    }
     let job = SolveJob { goal_m, truth, ..job(&input, method, options) };
     let solved =
         worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path, &input.seen.observations, cancel))?;

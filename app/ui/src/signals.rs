@@ -73,7 +73,7 @@ mod tests {
         signals.lead_to(Arc::clone(&stop), waker);
         desk.connected();
         let goal = MotionGoal::Joints([0.0; 6].into());
-        desk.ask(MotionTask::Move(MotionRequest { id: MotionId(1), goal, speed: 1.0 }), &stop);
+        desk.ask(MotionTask::Move(MotionRequest { id: MotionId(1), goal, speed: 1.0, correction: None }), &stop);
         let Work::Motion(_, cancel) = desk.take(0.0) else { panic!("no motion") };
         signals.hear();
         assert!(signals.is_asked() && cancel.is_cancelled() && stop.is_barred());

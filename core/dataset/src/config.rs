@@ -37,7 +37,11 @@ struct RawRobot {
     joints: Option<Spanned<i64>>,
     joint_unit: Option<AngleUnit>,
     arm: Option<Spanned<RawArm>>,
+    tool_m: Option<Spanned<Vec<f64>>>,
 }
+
+/// A longer tool is in millimetres.
+pub const LONGEST_TOOL_M: f64 = 10.0;
 
 /// The table `[robot]`.
 #[derive(Debug, Clone)]
@@ -48,6 +52,8 @@ pub(super) struct RobotConfig {
     pub pose: PoseDirection,
     /// Columns of joint angles after those of the rotation, if there are any.
     pub joints: Option<JointColumns>,
+    /// Where the tip of the tool is in the frame of the tip, metres.
+    pub tool_m: Option<[f64; 3]>,
 }
 
 /// How a row of a pose table writes its rotation.
@@ -237,7 +243,17 @@ fn robot_config(raw: &Spanned<RawRobot>) -> Result<RobotConfig, Spanning> {
         RawRotation::Matrix => RotationConvention::Matrix,
     };
     let joints = joint_columns(raw.joints.as_ref(), raw.joint_unit, raw.arm.as_ref(), whole.clone())?;
-    Ok(RobotConfig { poses: raw.poses.clone(), length_unit: raw.length_unit, rotation, pose: raw.pose, joints })
+    let tool_m = raw.tool_m.as_ref().map(tool).transpose()?;
+    Ok(RobotConfig { poses: raw.poses.clone(), length_unit: raw.length_unit, rotation, pose: raw.pose, joints, tool_m })
+}
+
+fn tool(raw: &Spanned<Vec<f64>>) -> Result<[f64; 3], Spanning> {
+    let place = <[f64; 3]>::try_from(raw.get_ref().as_slice()).ok();
+    let place = place.filter(|place| place.iter().all(|metres| metres.abs() <= LONGEST_TOOL_M));
+    place.ok_or_else(|| {
+        let (value, want) = (format!("{:?}", raw.get_ref()), "three numbers x, y, z in metres, none beyond 10 m");
+        (raw.span(), DatasetProblem::BadValue { key: "tool_m", value, want })
+    })
 }
 
 fn camera_config(raw: &Spanned<RawCamera>, row: usize) -> Result<CameraConfig, Spanning> {

@@ -70,6 +70,7 @@ use handeye_geometry::natural_order;
 use handeye_geometry::targets::TargetSpec;
 use handeye_images::ImageFileError;
 
+pub use config::LONGEST_TOOL_M;
 use config::{Config, PoseDirection};
 use corners::CornerTable;
 pub use error::{DatasetError, DatasetProblem};
@@ -96,6 +97,8 @@ pub struct Dataset {
     pub image_size: Option<(u32, u32)>,
     /// The arm that the joint angles belong to, and whether they fit the poses; `None` when `[robot.arm]` is absent.
     pub arm: Option<DatasetArm>,
+    /// Where the tip of the tool is in the frame of the tip, metres, where `[robot]` says so.
+    pub tool_m: Option<[f64; 3]>,
     /// What the tables name outside of the folder, through `../`.
     pub outside: Vec<String>,
     pose_table: Option<PathBuf>,
@@ -208,6 +211,7 @@ impl Dataset {
             entries: out,
             image_size,
             arm,
+            tool_m: config.robot.as_ref().and_then(|robot| robot.tool_m),
             outside: outside.problems(poses_file.as_ref()),
             pose_table: poses_file.map(|f| f.path),
             text_files,

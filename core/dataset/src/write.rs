@@ -37,6 +37,7 @@ pub fn description(
     target: &TargetSpec,
     camera: Option<&CameraInput>,
     joints: Option<Joints<'_>>,
+    tool_m: Option<[f64; 3]>,
 ) -> String {
     let mode = match mode {
         Mode::EyeInHand => "eye_in_hand",
@@ -47,6 +48,9 @@ pub fn description(
          [robot]\nposes = \"{POSE_TABLE}\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"\n",
         target_table(target)
     );
+    if let Some(tool_m) = tool_m {
+        let _ok = writeln!(text, "tool_m = {tool_m:?}").is_ok();
+    }
     match joints {
         Some(Joints::Of(arm)) => text.push_str(&arm_table(arm)),
         Some(Joints::Count(count)) => text.push_str(&joint_columns(count)),

@@ -14,7 +14,7 @@ const STEPS: usize = 20;
 const ARRIVED: f64 = 1e-9;
 
 /// An arm as its controller takes it to be, where it stands, and what it is off.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CorrectedArm {
     /// As the controller takes it to be.
     pub arm: Arm,

@@ -169,7 +169,7 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
         intrinsics: Some(camera.intrinsics),
         model: camera.intrinsics.distortion,
     });
-    let body = description(h.mode, &target, camera.as_ref(), with_joints.then_some(Joints::Count(joints)));
+    let body = description(h.mode, &target, camera.as_ref(), with_joints.then_some(Joints::Count(joints)), None);
     if let Some(recorded) = &recorded {
         let key = format!("corners = \"{CORNERS}\"\n\n[robot]");
         text.push_str(&body.replacen("\n[robot]", &key, 1));

@@ -9,12 +9,16 @@ use handeye_arm::Arm;
 use handeye_estimate::ArmFit;
 use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::handeye::joint::{ArmErrors, LinkError, SmallSample, arm_parameters};
+use handeye_estimate::reach_error::USUAL_TOOL_M;
 
 /// The errors of the robot's arm as the images show them, and the transforms that go with corrected poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArmEstimate {
     /// The arm as its controller takes it to be, where it stands and with the tip at its end: metres and radians.
     pub chain: Arm,
+    /// Where the tip of the tool is in the frame of the tip for which the reach errors of `quality` are, metres.
+    #[serde(default = "usual_tool")]
+    pub tool_m: [f64; 3],
     /// What is off about each joint, from the base to the tip.
     pub joints: Vec<JointErrorEstimate>,
     /// How large errors of their kind are in this arm.
@@ -36,6 +40,11 @@ pub struct ArmEstimate {
     pub heldout_px: Option<HeldOutByArm>,
     /// Whether views left out are predicted worse by corrected poses, by more than chance: then do not correct.
     pub contradicted: bool,
+}
+
+/// Results that say nothing of a tool were made with this one.
+fn usual_tool() -> [f64; 3] {
+    [0.0, 0.0, USUAL_TOOL_M]
 }
 
 /// What is off about one joint, each with its standard deviation. What no view can tell from the two transforms is `None`.
@@ -145,6 +154,7 @@ impl ArmEstimate {
         let row = |i: usize| (0..count).map(|j| fit.covariance[(12 + i, 12 + j)]).collect();
         Some(Self {
             chain: chain.clone(),
+            tool_m: usual_tool(),
             joints,
             levels: ArmLevels {
                 angle_deg: fit.noise.link_rad.to_degrees(),
@@ -194,6 +204,7 @@ impl ArmEstimate {
     pub(super) fn check(&self) -> Checked {
         let parameters = arm_parameters(self.chain.joint_count());
         require(self.joints.len() == self.chain.joint_count(), "arm.joints", "must be as many as those of the chain")?;
+        all_finite(&self.tool_m, "arm.tool_m")?;
         for parameter in &parameters {
             let value = value_of(&self.joints[parameter.joint], parameter.error);
             require(value.is_some_and(f64::is_finite), "arm.joints", "must have a number for all but the first joint")?;

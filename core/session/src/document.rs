@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::capture_id::CaptureId;
 use super::edit_error::EditError;
 use handeye_arm::{ArmModel, JointKind, MAX_JOINTS};
-use handeye_dataset::CameraInput;
 use handeye_dataset::pose_record;
 use handeye_dataset::taught_poses::{Goal, TaughtPose};
+use handeye_dataset::{CameraInput, LONGEST_TOOL_M};
 use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_export::ExportView;
 use handeye_geometry::camera::Intrinsics;
@@ -56,6 +56,9 @@ pub struct SessionMeta {
     /// The arm, where it is known: what the joint angles of the captures belong to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmModel>,
+    /// Where the tip of the tool is in the frame of the tip, metres; without it a usual one is counted with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_m: Option<[f64; 3]>,
     /// How the joints of an arm that is not known move, from the base up. Without it they are taken for six that turn, as
     /// they were in sessions that were written before there were others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -222,6 +225,9 @@ impl SessionMeta {
         self.target.check().map_err(|why| bad("target", text!("cannot be: {why}", why = why)))?;
         if let Some(Err(why)) = self.arm.as_ref().map(ArmModel::arm) {
             return Err(bad("arm", text!("is of no use: {why}", why = why)));
+        }
+        if self.tool_m.iter().flatten().any(|metres| !(metres.abs() <= LONGEST_TOOL_M)) {
+            return Err(bad("tool_m", text!("is not finite, or longer than {most} m", most = LONGEST_TOOL_M)));
         }
         if self.joint_kinds.as_ref().is_some_and(|kinds| kinds.is_empty() || kinds.len() > MAX_JOINTS) {
             return Err(bad("joint_kinds", text!("has no joints, or more than an arm has")));

@@ -34,6 +34,7 @@
 //!     ground_truth: None,
 //!     arm: None,
 //!     joint_kinds: None,
+//!     tool_m: None,
 //! };
 //! let mut store = Store::create(&folder.path().join("session"), meta)?;
 //! store.apply(Edit::SetMode(Mode::EyeToHand))?;

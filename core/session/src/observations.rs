@@ -6,6 +6,7 @@ use super::capture_id::CaptureId;
 use super::document::{Document, Role};
 use handeye_dataset::CameraInput;
 use handeye_estimate::placement::{Placement, PlacementError};
+use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::{Observations, ObservedView};
 use handeye_geometry::targets::observation::{Sight, View};
 
@@ -28,6 +29,8 @@ pub struct SessionObservations {
 pub struct ArmOfViews {
     /// Where the views put it, and how far from them.
     pub placement: Placement,
+    /// Where the tip of its tool is in the frame of the tip, metres.
+    pub tool_m: [f64; 3],
     /// Its joint values in each view, radians; `None` where a view has none.
     pub joints_rad: Vec<Option<Vec<f64>>>,
 }
@@ -56,7 +59,11 @@ impl Document {
             },
             captures: Vec::new(),
             verification: Vec::new(),
-            arm: placement.map(|placement| ArmOfViews { placement, joints_rad: Vec::new() }),
+            arm: placement.map(|placement| ArmOfViews {
+                placement,
+                tool_m: self.meta.tool_m.unwrap_or([0.0, 0.0, USUAL_TOOL_M]),
+                joints_rad: Vec::new(),
+            }),
         };
         for capture in &self.captures {
             let sight = sights(capture.id);

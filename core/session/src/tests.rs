@@ -30,6 +30,7 @@ pub(super) fn meta() -> SessionMeta {
         ground_truth: Some(GroundTruth::new(&links, Some(intrinsics))),
         arm: None,
         joint_kinds: None,
+        tool_m: None,
     }
 }
 

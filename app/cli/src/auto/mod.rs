@@ -26,6 +26,8 @@ use crate::auto::sequence::{Images, PoseSequence};
 use crate::cell_choice::CellChoice;
 use crate::open_cell::OpenCell;
 use crate::rerun_arg;
+use crate::solve::Wanted;
+use crate::tool_arg::ToolArg;
 use crate::towards_board::TowardsBoard;
 use crate::{Failure, RerunArg, arm_arg, box_arg, out, record, solve};
 use guided::GuidedSequence;
@@ -82,6 +84,8 @@ pub struct AutoArgs {
     /// Images that are averaged for each capture.
     #[arg(long, value_name = "N", default_value_t = CaptureOptions::default().frames, value_parser = clap::value_parser!(u32).range(1..=64), help_heading = heading::POSES)]
     frames: u32,
+    #[command(flatten)]
+    tool: ToolArg,
     #[command(flatten)]
     rerun: RerunArg,
 }
@@ -208,6 +212,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let meta = SessionMeta {
         seeds: args.cell.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
         arm: start::arm(cell.kinematics()),
+        tool_m: args.tool.tool_m,
         joint_kinds: start::joint_kinds(cell.facts.joints.iter().map(|joint| joint.kind)),
         target,
         mode: args.mode.unwrap_or(Mode::EyeInHand),
@@ -250,7 +255,9 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(cell);
 
     let goal_m = guide.as_ref().map_or(model::Goal::default().0, |guide| guide.options().goal_m);
-    let mut solution = solve::folder(&folder, Method::Joint, Options::default(), goal_m, truth, &cancel)?;
+    // The session has the tool.
+    let wanted = Wanted { method: Method::Joint, options: Options::default(), goal_m, tool_m: None };
+    let mut solution = solve::folder(&folder, wanted, truth, &cancel)?;
     solution.guided_by(guide.as_ref().map(guided_record));
     finish(&session, args.json.as_ref(), &solution)?;
     solution.note(&recorder);

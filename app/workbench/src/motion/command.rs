@@ -1,5 +1,6 @@
 //! What may be wanted of moving the arm, and what is reported.
 
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_session::CaptureId;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,13 @@ pub enum Command {
     Move {
         /// Where to.
         goal: MotionGoal,
+        /// In words.
+        what: Text,
+    },
+    /// Move the tip to where it really is at this pose, by the errors of the arm that the calibration found.
+    MoveCorrected {
+        /// Where the tip shall be.
+        base_from_tip: Pose<Base, Tip>,
         /// In words.
         what: Text,
     },

@@ -22,7 +22,12 @@ fn pressed() -> StopLine {
 }
 
 fn task(id: u64) -> MotionTask {
-    MotionTask::Move(MotionRequest { id: MotionId(id), goal: MotionGoal::Joints([0.0; 6].into()), speed: 1.0 })
+    MotionTask::Move(MotionRequest {
+        id: MotionId(id),
+        goal: MotionGoal::Joints([0.0; 6].into()),
+        speed: 1.0,
+        correction: None,
+    })
 }
 
 fn button(index: usize) -> JogRequest {

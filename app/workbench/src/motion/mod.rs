@@ -2,6 +2,7 @@
 
 pub(crate) mod ask;
 pub mod command;
+pub mod correction;
 pub mod desk;
 pub mod grip;
 pub(crate) mod jog_line;

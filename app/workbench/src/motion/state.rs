@@ -3,6 +3,7 @@
 use handeye_link::{Jog, JogFrame, MotionGoal};
 use serde::{Deserialize, Serialize};
 
+use crate::motion::correction::Correction;
 use crate::text::Text;
 
 /// Counts motions, so that what is reported can be told from what came before.
@@ -10,7 +11,7 @@ use crate::text::Text;
 pub struct MotionId(pub u64);
 
 /// A motion that is asked for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MotionRequest {
     /// Its number.
     pub id: MotionId,
@@ -18,6 +19,18 @@ pub struct MotionRequest {
     pub goal: MotionGoal,
     /// Share of the fastest speed, over 0 and up to 1.
     pub speed: f64,
+    /// The errors of the arm that the move allows for.
+    pub correction: Option<Correction>,
+}
+
+impl MotionRequest {
+    /// Where the arm is sent.
+    ///
+    /// # Errors
+    /// Why no command takes the tip there.
+    pub fn goal(&self) -> Result<MotionGoal, Text> {
+        self.correction.as_ref().map_or_else(|| Ok(self.goal), |correction| correction.command(&self.goal))
+    }
 }
 
 /// A move that waits until a person lets the arm go.

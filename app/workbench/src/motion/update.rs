@@ -1,5 +1,7 @@
 //! Moving and jogging the arm.
 
+use std::sync::Arc;
+
 use handeye_arm::JointValues;
 use handeye_geometry::frames::{Camera, Pose, Tip};
 use handeye_session::CaptureId;
@@ -8,6 +10,7 @@ use super::command::{Command, Event};
 use crate::app::{Context, Numbers};
 use crate::model::{Jog, JogStep, Model, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
 use crate::motion::ask::{confirm_move, go_home, may_set_out, set_confirm_moves, set_out, skip_move};
+use crate::motion::correction::{Correction, corrected_arm};
 use crate::motion::rest::{stop, stopped};
 use crate::taught::sequence::{plan_refused, sequence_moved};
 use crate::text::Text;
@@ -20,6 +23,7 @@ pub(crate) fn apply(cx: &mut Context, command: Command) {
     match command {
         Command::Stop => stop(&mut cx.model, &cx.workers),
         Command::Move { goal, what } => start_motion(cx, goal, what),
+        Command::MoveCorrected { base_from_tip, what } => start_corrected(cx, MotionGoal::Tip(base_from_tip), what),
         Command::Jog(jog) => press_jog(&mut cx.model, &cx.workers, &mut cx.numbers, jog),
         Command::JogHeld(jog) => hold_jog(&mut cx.model, &cx.workers, jog),
         Command::JogReleased => cx.workers.release_jog(),
@@ -43,10 +47,25 @@ pub(crate) fn absorb(cx: &mut Context, event: Event) {
 
 /// Moves the arm to a place that the words name.
 pub(crate) fn start_motion(cx: &mut Context, goal: MotionGoal, what: Text) {
+    start(cx, goal, what, None);
+}
+
+/// The same by the errors of the arm. Where they are not known any more nothing moves: the person asked for another place.
+fn start_corrected(cx: &mut Context, goal: MotionGoal, what: Text) {
+    let arm = corrected_arm(&cx.model).map(|(_, arm)| Arc::clone(arm));
+    let Some((arm, robot)) = arm.zip(cx.model.robot.as_ref()) else {
+        let why = text!("The errors of this arm are not known: nothing was moved");
+        return cx.model.notify_in(Pane::Jog, Severity::Warning, why);
+    };
+    let near_rad = robot.joints_rad.to_vec();
+    start(cx, goal, what, Some(Correction { arm, near_rad }));
+}
+
+fn start(cx: &mut Context, goal: MotionGoal, what: Text, correction: Option<Correction>) {
     cx.model.asked = None;
     cx.numbers.motion = MotionId(cx.numbers.motion.0 + 1);
     let id = cx.numbers.motion;
-    let request = MotionRequest { id, goal, speed: cx.model.speed() };
+    let request = MotionRequest { id, goal, speed: cx.model.speed(), correction };
     cx.model.messages.is_over_in(Pane::Jog);
     match cx.workers.move_to(request) {
         Ok(()) => {

@@ -47,7 +47,10 @@ impl Motions {
         outlet: &Outlet,
     ) -> Result<(), PortError> {
         let outcome = match task {
-            MotionTask::Move(request) => port.move_to(&request.goal, request.speed, cancel),
+            MotionTask::Move(request) => match request.goal() {
+                Ok(goal) => port.move_to(&goal, request.speed, cancel),
+                Err(why) => Ok(MotionOutcome::Refused(why)),
+            },
             MotionTask::JogStep { request, length, .. } => port.jog_step(request, *length, cancel),
             MotionTask::Follow { requested, speed, .. } => self.follow(port, *requested, *speed, cancel, outlet),
             MotionTask::Guide { id, request } => return self.guide(port, *id, request, cancel, outlet),

@@ -78,7 +78,7 @@ fn headline(result: &CalibrationResult) -> Section {
     };
     Section {
         title: title.to_owned(),
-        lines: expected_error(result).into_iter().chain(reach(result)).map(Line::Words).collect(),
+        lines: reach(result).into_iter().chain(expected_error(result)).map(Line::Words).collect(),
         ..Section::default()
     }
 }
@@ -107,10 +107,11 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
 /// How near a tool arrives, where the arm is known.
 fn reach(result: &CalibrationResult) -> Option<String> {
     let (plain, corrected) = result.quality.reach_error_95_mm.zip(result.quality.reach_error_corrected_95_mm)?;
+    let tool_m = result.arm.as_ref().map_or(USUAL_TOOL_M, |arm| Vector3::from(arm.tool_m).norm());
     Some(format!(
         "a tool of {:.0} mm arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is, \
          within {corrected:.3} mm with corrected commands (`handeye correct`)",
-        USUAL_TOOL_M * 1e3
+        tool_m * 1e3
     ))
 }
 

@@ -50,5 +50,6 @@ pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
         ground_truth,
         arm: None,
         joint_kinds: None,
+        tool_m: None,
     }
 }

@@ -3,10 +3,8 @@
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_estimate::handeye::joint::PrintErrors;
-use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::verify::{DepthErrors, DepthReport};
 use handeye_estimate::{ArmFit, DepthsInFit, JointFit, ShapeEstimate, ViewStatus};
-use handeye_result::Quality;
 use handeye_wording::shown;
 
 use crate::text::Text;
@@ -29,9 +27,8 @@ pub struct EstimatedValue {
 }
 
 /// All of it, one line each; nothing is said of what is as usual.
-pub fn estimated(calibration: &Calibration, quality: &Quality, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
+pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
-    lines.extend(reach(quality));
     lines.extend(views_aside(calibration));
     lines.extend(corners_aside(calibration));
     let depths = calibration.joint.as_ref().and_then(|joint| joint.depths.as_ref());
@@ -47,25 +44,6 @@ pub fn estimated(calibration: &Calibration, quality: &Quality, depth: Option<&De
     lines.push(freedom(joint));
     lines.extend(joint.arm.as_ref().map(arm));
     lines
-}
-
-/// How near a tool arrives, where the arm is known.
-fn reach(quality: &Quality) -> Option<EstimatedValue> {
-    let (plain, corrected) = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm)?;
-    Some(EstimatedValue {
-        what: text!("A tool arrives within"),
-        value: text!(
-            "{plain} mm as the controller is, {corrected} mm with corrected commands",
-            plain = format!("{plain:.2}"),
-            corrected = format!("{corrected:.2}")
-        ),
-        meaning: text!(
-            "Distance between a point of the board that the camera saw and the tip of a tool of {tool} mm along z of the tip that is \
-             sent there; 95 % are below",
-            tool = format!("{:.0}", USUAL_TOOL_M * 1e3)
-        ),
-        why: None,
-    })
 }
 
 fn views_aside(calibration: &Calibration) -> Option<EstimatedValue> {
@@ -268,7 +246,7 @@ mod tests {
         joint.widening = Overdispersion { factor: 1.0, by: None, lens: 1.0, checks: Vec::new() };
         joint.noise.view_px = 0.0;
         change(&mut calibration);
-        let lines = estimated(&calibration, &Quality::default(), None);
+        let lines = estimated(&calibration, None);
         lines
             .iter()
             .map(|it| (it.what.in_language(Language::English), it.value.in_language(Language::English)))

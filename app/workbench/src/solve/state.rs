@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::Finding;
 use handeye_estimate::verify::{DepthReport, Predictor, Verification, VerifyError};
@@ -27,6 +28,8 @@ pub struct Solved {
     pub calibration: Calibration,
     /// The document that is exported and compared.
     pub result: CalibrationResult,
+    /// The arm with its errors; `None` where they are not known or not to be counted on.
+    pub corrected_arm: Option<Arc<CorrectedArm>>,
     /// What is weak and what to do next.
     pub findings: Vec<Finding>,
     /// The calibration as what predicts and measures; `None` without a hand-eye.

@@ -9,7 +9,7 @@ use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_estimate::diagnose::{Calibration, examine};
 use handeye_estimate::handeye::HandEyeError;
-use handeye_estimate::reach_error::{ReachErrors, Seen, USUAL_TOOL_M, reach_errors};
+use handeye_estimate::reach_error::{ReachErrors, Seen, reach_errors};
 use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
 use handeye_estimate::{self as estimate, ArmFit, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
 use handeye_geometry::progress::{CancelToken, Progress, Work};
@@ -102,7 +102,7 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
         job.arm.as_ref().zip(calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()))
     {
         if let Some(arm) = of_views.placement.arm_of_poses() {
-            result.arm = ArmEstimate::new(arm, errors);
+            result.arm = ArmEstimate::new(arm, errors).map(|arm| ArmEstimate { tool_m: of_views.tool_m, ..arm });
             // What views left out contradict is not promised.
             let reach = reach(job, &calibration, arm, (of_views, errors)).filter(|_| !errors.contradicted);
             result.quality.reach_error_95_mm = reach.map(|reach| reach.as_it_is_95_m * 1e3);
@@ -132,7 +132,10 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
         return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
     }
     result.verification = verification.as_ref().and_then(|outcome| outcome.as_ref().ok()).map(summary);
+    let counts = |arm: &&ArmEstimate| !arm.contradicted && result.quality.reach_error_corrected_95_mm.is_some();
+    let corrected_arm = result.arm.as_ref().filter(counts).and_then(|arm| arm.corrected_arm().ok()).map(Arc::new);
     Ok(Solved {
+        corrected_arm,
         job: job.id,
         captures: job.captures.clone(),
         result,
@@ -159,7 +162,7 @@ fn reach(
         let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
         Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })
     });
-    let tool = Vector3::z() * USUAL_TOOL_M;
+    let tool = Vector3::from(of_views.tool_m);
     reach_errors(&arm, errors, &calibration.hand_eye?, &seen.collect::<Vec<_>>(), &job.observations.target, &tool)
 }
 

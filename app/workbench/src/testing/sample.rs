@@ -6,8 +6,10 @@ use std::sync::Arc;
 
 use handeye_arm::{ArmKind, JointKind, JointValues};
 use handeye_coppeliasim::cell::ArmKinematics;
+use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::{self, Finding, FindingOptions};
+use handeye_estimate::handeye::joint::{ArmErrors, ArmParameter, LinkError, SmallSample, arm_parameters};
 use handeye_estimate::handeye::screening::Distance;
 use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_estimate::verify::{self, Predictor};
@@ -21,7 +23,7 @@ use handeye_geometry::targets::observation::{Corner, Corners, View};
 use handeye_session::{CaptureId, CaptureRecord, Document, Role};
 use handeye_track::{BoardDetection, ByDepth, Estimate, State, Update};
 use image::{Rgb, RgbImage};
-use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
     BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, FollowRequest, FollowStatus, FrameImages, FrameInfo,
@@ -244,6 +246,7 @@ pub fn solved() -> Model {
         captures: (1..=FITTED).map(CaptureId).collect(),
         findings: findings::findings(&observations, Some(&calibration), &FINDINGS),
         result,
+        corrected_arm: None,
         calibrated: Some(calibrated),
         verification: Some(verification),
         depth: None,
@@ -262,6 +265,35 @@ pub fn with_answer(change: impl FnOnce(&mut Solved)) -> Model {
     change(&mut solved);
     model.solve.solved = Some(Arc::new(solved));
     model
+}
+
+/// The arm of the sample with errors of its own: tenths of a degree and of a millimetre.
+pub fn corrected_arm() -> CorrectedArm {
+    let robot = connected().robot.expect("connected");
+    let bare = ArmKind::Ur5Coppeliasim.arm();
+    let there = *bare.forward(&robot.joints_rad).expect("six joints").isometry();
+    let arm = bare.mounted(robot.base_from_tip.isometry() * there.inverse(), Isometry3::identity());
+    let count = arm_parameters(6).len();
+    let value = |(k, parameter): (usize, &ArmParameter)| {
+        let size = if matches!(parameter.error, LinkError::ShiftX | LinkError::ShiftY) { 2e-4 } else { 2e-3 };
+        size * (k as f64 * 0.7).sin()
+    };
+    CorrectedArm {
+        arm,
+        errors: ArmErrors::new(6, arm_parameters(6).iter().enumerate().map(value).collect()).expect("so many"),
+        covariance: DMatrix::identity(count, count) * 1e-9,
+        unexplained: (2e-5, 1e-5),
+        small_sample: SmallSample::KNOWN,
+    }
+}
+
+/// [`solved`] with an answer that knows the errors of the arm.
+pub fn with_errors_of_the_arm() -> Model {
+    with_answer(|solved| {
+        solved.corrected_arm = Some(Arc::new(corrected_arm()));
+        solved.result.quality.reach_error_95_mm = Some(2.91);
+        solved.result.quality.reach_error_corrected_95_mm = Some(0.25);
+    })
 }
 
 /// The capture that does not fit the others in [`with_an_outlier`].

@@ -9,6 +9,7 @@ use crossbeam_channel::Receiver;
 use super::fake::{FakeCell, FakeMotions};
 use super::*;
 use crate::model::{CellFacts, FollowRequest, FollowStatus, Link, LinkState, MotionGoal, MotionOutcome};
+use crate::motion::correction::Correction;
 use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::{connect, messages, motion, taught, track};
@@ -113,7 +114,9 @@ impl Bench {
     }
 
     pub fn move_to(&self, id: u64, goal: MotionGoal, speed: f64) {
-        self.workers.move_to(MotionRequest { id: MotionId(id), goal, speed }).expect("the worker is there");
+        self.workers
+            .move_to(MotionRequest { id: MotionId(id), goal, speed, correction: None })
+            .expect("the worker is there");
     }
 
     /// Events of the ends of motions so far.
@@ -122,6 +125,26 @@ impl Bench {
         workers.drain(|event| events.push(event));
         self.events.iter().filter(|event| matches!(event, Event::Motion(motion::Event::Moved { .. }))).count()
     }
+}
+
+#[test]
+fn a_corrected_move_is_sent_by_the_errors_of_the_arm_and_one_out_of_reach_is_refused() {
+    let (cell, mut bench) = fake(FakeMotions::Arrive);
+    let arm = Arc::new(sample::corrected_arm());
+    let near_rad = vec![0.1, 0.5, -1.0, 0.0, 1.5, 0.0];
+    let wanted = arm.arm.forward(&near_rad).expect("six joints");
+    let correction = Correction { arm: Arc::clone(&arm), near_rad };
+    let request = |id, goal| MotionRequest { id: MotionId(id), goal, speed: 1.0, correction: Some(correction.clone()) };
+    bench.workers.move_to(request(1, MotionGoal::Tip(wanted))).expect("the worker is there");
+    assert_eq!(bench.moved(1), MotionOutcome::Arrived);
+    let [MotionGoal::Tip(sent)] = cell.script().moved[..] else { panic!("one move") };
+    assert!(sent.distance_to(&wanted).0 > 1e-4, "the errors are seen");
+    let joints = arm.arm.inverse(&sent, &correction.near_rad).expect("within reach");
+    assert!(arm.actual(&joints).expect("six joints").distance_to(&wanted).0 < 1e-8, "the tip gets there");
+    let far = Pose::from_isometry(nalgebra::Isometry3::translation(9.0, 0.0, 0.0));
+    bench.workers.move_to(request(2, MotionGoal::Tip(far))).expect("the worker is there");
+    assert!(matches!(bench.moved(2), MotionOutcome::Refused(_)));
+    assert_eq!(cell.script().moved.len(), 1, "nothing moved");
 }
 
 const HOME: MotionGoal = MotionGoal::Joints(JointValues::of([0.0, 0.5, -1.0, 0.0, 1.5, 0.0]));

@@ -216,6 +216,24 @@ fn numbers_follow_the_arm_until_a_person_edits_them_and_say_how_far_the_move_is(
 }
 
 #[test]
+fn a_typed_tip_pose_is_corrected_for_the_errors_of_the_arm_unless_a_person_says_otherwise() {
+    let mut pane = driven(sample::with_errors_of_the_arm());
+    assert!(pane.sees("really [mm]") && pane.sees("By the errors of the arm"), "{}", pane.text());
+    pane.click("Tip pose in base");
+    assert!(pane.sees("within 0.25 mm with it and 2.91 mm without"));
+    let sent = pane.click("Move there");
+    assert!(matches!(&sent[..], [Command::Motion(motion::Command::MoveCorrected { .. })]), "{sent:?}");
+    pane.click("Correct for the errors of the arm");
+    let sent = pane.click("Move there");
+    assert!(matches!(&sent[..], [Command::Motion(motion::Command::Move { .. })]), "{sent:?}");
+    let other_arm = Pose::from_isometry(nalgebra::Isometry3::translation(0.0, 0.0, 0.01));
+    let robot = pane.model().robot.as_mut().expect("connected");
+    robot.base_from_tip = robot.base_from_tip * other_arm;
+    pane.steps();
+    assert!(!pane.sees("Correct for the errors of the arm") && !pane.sees("really [mm]"), "it is another tool");
+}
+
+#[test]
 fn a_slider_moves_its_joint_when_it_is_let_go_and_not_before() {
     let mut pane = driven(sample::connected());
     let rect = pane.harness.get_by_label("Goal of joint 1 in degrees").rect();

@@ -13,6 +13,7 @@ use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, MotionGoal, RobotState};
 use handeye_workbench::motion;
+use handeye_workbench::motion::correction::corrected_arm;
 use handeye_workbench::motion::way::Way;
 use handeye_workbench::tr;
 
@@ -33,13 +34,23 @@ struct Typed {
     is_edited: bool,
     /// Whether the arm was sent there.
     is_sent: bool,
+    /// Whether a person wants the errors of the arm corrected; until one has said so they are where that brings the tip nearer.
+    corrected: Option<bool>,
     /// The cell that it is for, see [`Model::cells`].
     cell: u64,
 }
 
 impl Default for Typed {
     fn default() -> Self {
-        Self { is_tip: false, joints: JointValues::zeros(0), tip: [0.0; 6], is_edited: false, is_sent: false, cell: 0 }
+        Self {
+            is_tip: false,
+            joints: JointValues::zeros(0),
+            tip: [0.0; 6],
+            is_edited: false,
+            is_sent: false,
+            corrected: None,
+            cell: 0,
+        }
     }
 }
 
@@ -103,6 +114,7 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     if typed.is_tip {
         parts::hint_ui(ui, tr!(language, "Rotation: R = Rz(yaw) · Ry(pitch) · Rx(roll), as in URDF"));
     }
+    let is_corrected = typed.is_tip && corrected_ui(ui, model, &mut typed.corrected);
     let goal = typed.goal(model);
     let way = Way::to(&goal, model);
     let reported = match way {
@@ -115,7 +127,11 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
         let reason = if typed.is_tip { blocked.tip } else { blocked.arm };
         if parts::gated_ui(ui, reason, Button::new(tr!(language, "Move there"))).clicked() {
             let what = if typed.is_tip { text!("typed tip pose") } else { text!("typed joint values") };
-            outbox.send(motion::Command::Move { goal, what });
+            outbox.send(if is_corrected {
+                motion::Command::MoveCorrected { base_from_tip: typed.base_from_tip(), what }
+            } else {
+                motion::Command::Move { goal, what }
+            });
             typed.is_sent = true;
         }
         let is_read = model.robot.is_some();
@@ -124,6 +140,27 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
         }
     });
     parts::remember(ui, id, typed);
+}
+
+/// Whether the errors of the arm are corrected, where they are known.
+fn corrected_ui(ui: &mut Ui, model: &Model, wanted: &mut Option<bool>) -> bool {
+    let language = model.view.language;
+    let Some((solved, _)) = corrected_arm(model) else { return false };
+    let quality = &solved.result.quality;
+    let Some((plain, corrected)) = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm) else {
+        return false;
+    };
+    let mut is_corrected = wanted.unwrap_or(corrected < plain);
+    if ui.checkbox(&mut is_corrected, tr!(language, "Correct for the errors of the arm")).changed() {
+        *wanted = Some(is_corrected);
+    }
+    let expected = text!(
+        "A tool arrives within {corrected} mm with it and {plain} mm without, in 95 of 100 cases",
+        corrected = format!("{corrected:.2}"),
+        plain = format!("{plain:.2}")
+    );
+    parts::hint_ui(ui, &expected.in_language(language));
+    is_corrected
 }
 
 fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {

@@ -9,7 +9,7 @@ use handeye_workbench::tr;
 /// A line each; nothing for what is as usual.
 pub fn estimate_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     let language = model.view.language;
-    let lines = model::estimated(&solved.calibration, &solved.result.quality, solved.depth.as_ref());
+    let lines = model::estimated(&solved.calibration, solved.depth.as_ref());
     if lines.is_empty() {
         return;
     }

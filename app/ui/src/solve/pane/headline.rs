@@ -1,4 +1,7 @@
-//! The one number that matters: the expected error where the tool works, against the goal.
+//! The numbers that matter: the expected error where the tool works, against the goal, and how near a tool arrives by this arm.
+
+use handeye_estimate::reach_error::USUAL_TOOL_M;
+use nalgebra::Vector3;
 
 use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichText, Stroke, Ui};
 
@@ -12,6 +15,8 @@ use handeye_workbench::tr;
 
 /// Size of the number.
 const FIGURE: f32 = 28.0;
+/// Size of those of the arm.
+const REACH_FIGURE: f32 = 20.0;
 
 /// The card.
 pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) {
@@ -70,7 +75,53 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
                 };
                 ui.label(RichText::new(verdict).color(palette.tone(tone)));
             }
+            reach_ui(ui, model, solved);
         });
+}
+
+/// How near a tool arrives, where the arm is known: the calibration is one part of that, and the arm another.
+fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
+    let language = model.view.language;
+    let quality = &solved.result.quality;
+    let Some((as_it_is, corrected)) = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm) else {
+        return;
+    };
+    let palette = Palette::of(ui);
+    ui.add_space(4.0);
+    ui.label(RichText::new(tr!(language, "A tool arrives within (95 %)")).strong().color(palette.text));
+    ui.horizontal_wrapped(|ui| {
+        for (mm, how) in [
+            (as_it_is, tr!(language, "by the controller as it is")),
+            (corrected, tr!(language, "with corrected commands")),
+        ] {
+            ui.label(RichText::new(format!("{mm:.2} mm")).size(REACH_FIGURE).color(palette.text));
+            ui.label(RichText::new(how).color(palette.weak));
+            ui.add_space(12.0);
+        }
+    });
+    let tool = solved.result.arm.as_ref().map_or(USUAL_TOOL_M, |arm| Vector3::from(arm.tool_m).norm());
+    let meaning = text!(
+        "Distance between a point of the board that the camera saw and the tip of a tool of {tool} mm that is sent there.",
+        tool = format!("{:.0}", tool * 1e3)
+    );
+    ui.add(Label::new(RichText::new(meaning.in_language(language)).color(palette.weak)).wrap());
+    let goal_mm = model.view.goal.0 * 1e3;
+    let calibrated = quality.tip_error_95_mm.is_some_and(|error_mm| error_mm <= goal_mm);
+    if calibrated && as_it_is > goal_mm {
+        let advice = if corrected <= goal_mm {
+            tr!(
+                language,
+                "The calibration is good enough, and the arm is the limit: correct its commands, for which “handeye correct” makes the table."
+            )
+        } else {
+            tr!(
+                language,
+                "The calibration is good enough, and the arm is the limit: captures with more different postures of the arm tell its \
+                 errors better."
+            )
+        };
+        ui.add(Label::new(RichText::new(advice).color(palette.tone(Tone::Warning))).wrap());
+    }
 }
 
 fn goal_ui(ui: &mut Ui, model: &Model, goal_mm: f64, outbox: &mut Outbox) {

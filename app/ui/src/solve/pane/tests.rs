@@ -55,6 +55,30 @@ fn the_headline_is_the_expected_error_and_not_a_residual() {
 }
 
 #[test]
+fn what_a_tool_arrives_within_is_said_and_that_the_arm_is_the_limit_where_it_is() {
+    let with = |as_it_is, corrected| {
+        driven(sample::with_answer(|solved| {
+            solved.result.quality.tip_error_95_mm = Some(0.2);
+            solved.result.quality.reach_error_95_mm = as_it_is;
+            solved.result.quality.reach_error_corrected_95_mm = corrected;
+        }))
+    };
+    let mut pane = with(Some(2.91), Some(0.25));
+    pane.model().view.goal = Goal(0.3e-3);
+    pane.steps();
+    assert!(pane.sees("A tool arrives within (95 %)") && pane.sees("2.91 mm") && pane.sees("0.25 mm"));
+    assert!(pane.sees("a tool of 100 mm"), "{}", pane.text());
+    assert!(pane.sees("the arm is the limit: correct its commands"));
+    pane.model().view.goal = Goal(0.22e-3);
+    pane.steps();
+    assert!(pane.sees("the arm is the limit: captures with more"), "corrected commands do not reach it either");
+    pane.model().view.goal = Goal(3e-3);
+    pane.steps();
+    assert!(!pane.sees("the arm is the limit"));
+    assert!(!with(None, None).sees("A tool arrives"), "an arm that is not known promises nothing");
+}
+
+#[test]
 fn a_camera_without_a_robot_has_no_error_of_a_tip() {
     let pane = driven(sample::with_answer(|solved| {
         solved.calibration.hand_eye = None;

@@ -94,6 +94,7 @@ impl Archive {
         meta.target = dataset.target;
         meta.camera = dataset.camera;
         meta.arm = dataset.arm.as_ref().map(|arm| arm.model.clone());
+        meta.tool_m = dataset.tool_m;
         if let Some(mode) = dataset.mode {
             meta.mode = mode;
         }

@@ -38,6 +38,7 @@ fn meta() -> SessionMeta {
         ground_truth: None,
         arm: None,
         joint_kinds: None,
+        tool_m: None,
     }
 }
 
