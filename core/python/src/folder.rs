@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::PathBuf;
 
-use handeye_dataset::{Dataset, Entry};
+use handeye_dataset::{Dataset, DatasetArm, Entry};
+use handeye_estimate::placement::PlacementError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::json;
 
+use crate::arm_of_views::ArmOfViews;
 use crate::error::Failure;
 use crate::input::{Lens, Observations};
 use crate::numbers::{bytes_of, of_pose};
@@ -82,8 +84,15 @@ pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, Str
         "notes": dataset.outside,
     });
     let observed = dataset.observations(|_image| None);
+    let arm = dataset.arm.as_ref().map(|arm| of_dataset(&dataset, arm));
     let folder = Some(Folder { dataset, listing });
-    Ok((Observations { observed, folder, target_is_known: true }, described.to_string(), arrays))
+    Ok((Observations { observed, folder, target_is_known: true, arm }, described.to_string(), arrays))
+}
+
+fn of_dataset(dataset: &Dataset, arm: &DatasetArm) -> Result<ArmOfViews, PlacementError> {
+    let placement = arm.placement.clone()?;
+    let joints_rad = dataset.entries.iter().map(|entry| entry.joints_rad.clone()).collect();
+    Ok(ArmOfViews { placement, joints_rad })
 }
 
 fn matrix(pose: Option<Vec<f64>>) -> Vec<f64> {
