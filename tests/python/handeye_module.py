@@ -5,6 +5,7 @@
 HANDEYE is the binary, FOLDER an empty one. Prints a line for every check.
 """
 
+import functools
 import inspect
 import json
 import os
@@ -284,13 +285,17 @@ def data_without_an_answer_say_what_to_capture(rng):
     assert diagnosis.untested and not diagnosis.is_healthy
 
 
-def write_folder(folder, s, corners=True, images=()):
+def write_folder(folder, s, corners=True, images=(), joints=None):
     os.makedirs(folder)
     names = [f"images/{i:03}.png" for i in range(len(s.base_from_tip))]
     rows = lambda poses: "".join(
         f"{name}," + ",".join(repr(float(v)) for v in [*p[:3, 3], *p[:3, :3].ravel()]) + "\n" for name, p in zip(names, poses))
     header = "image,x,y,z," + ",".join(f"r{r}{c}" for r in "123" for c in "123") + "\n"
     files = {"poses.csv": header + rows(s.base_from_tip)}
+    if joints is not None:
+        lines = files["poses.csv"].splitlines()
+        columns = [[f"q{i}" for i in range(1, 7)], *([repr(float(v)) for v in q] for q in joints)]
+        files["poses.csv"] = "".join(",".join([line, *values]) + "\n" for line, values in zip(lines, columns))
     if corners:
         source = 'corners = "corners.csv"'
         lines = [f"{name},{i % 10},{i // 10},{float(u)!r},{float(v)!r}\n"
@@ -304,6 +309,8 @@ def write_folder(folder, s, corners=True, images=()):
     files["dataset.toml"] = (
         f'mode = "eye_in_hand"\n[target]\nkind = "chessboard"\ncolumns = 10\nrows = 7\nsquare_m = 0.015\n{source}\n'
         '[robot]\nposes = "poses.csv"\nlength_unit = "m"\nrotation = "matrix"\npose = "base_from_tip"\n')
+    if joints is not None:
+        files["dataset.toml"] += 'joints = 6\njoint_unit = "rad"\n[robot.arm]\nkind = "ur5e"\n'
     if corners:
         files["dataset.toml"] += "[camera]\nfixed = false\nwidth = 640\nheight = 480\n"
     for name, text in files.items():
@@ -463,6 +470,218 @@ def the_offset_of_two_clocks_is_told_and_robot_poses_are_there_at_the_times_of_i
     still = np.repeat(robot[:1], len(robot), axis=0)
     raises(handeye.CalibrationError, [], handeye.clock_offset, robot_stamps, still, camera_stamps,
            np.repeat(seen[:1], len(seen), axis=0), mode=mode)
+
+
+@functools.lru_cache(maxsize=None)
+def arm_case():
+    """A session of a UR5e that is not quite one, its joint values, another of the same arm, and the calibration."""
+    rng = np.random.default_rng(99)
+    rows = simulated.real_arm(rng)
+    s, joints = simulated.arm_session(rng, 25, rows)
+    result = handeye.calibrate(**of_arm(s), joints=joints, arm="ur5e")
+    return s, joints, simulated.arm_session(rng, 10, rows), result
+
+
+def of_arm(s):
+    return dict(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, intrinsics=LENS, mode="eye_in_hand")
+
+
+def urdf_of_rows(rows):
+    """The arm as a URDF: what follows a joint is the origin of the next one."""
+    links = "".join(f'<link name="l{i}"/>' for i in range(len(rows) + 1)) + '<link name="flange"/>'
+    numbers = lambda values: " ".join(repr(float(v)) for v in values)
+    text, behind = "", (0.0, 0.0, 0.0)
+    for i, (a, alpha, d, theta) in enumerate(rows):
+        assert theta == 0.0
+        text += (f'<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{i + 1}"/><axis xyz="0 0 1"/>'
+                 f'<origin xyz="{numbers((behind[0], 0, behind[1]))}" rpy="{numbers((behind[2], 0, 0))}"/></joint>')
+        behind = (a, d, alpha)
+    text += (f'<joint name="end" type="fixed"><parent link="l{len(rows)}"/><child link="flange"/>'
+             f'<origin xyz="{numbers((behind[0], 0, behind[1]))}" rpy="{numbers((behind[2], 0, 0))}"/></joint>')
+    return f'<robot name="r">{links}{text}</robot>'
+
+
+@check
+def the_errors_of_the_arm_are_found_and_its_commands_arrive(rng):
+    s, joints, (fresh, there), result = arm_case()
+    arm = result.arm
+    assert len(arm.joints) == 6 and not arm.contradicted and arm.heldout_px[1] < arm.heldout_px[0]
+    first, last = arm.joints[0], arm.joints[5]
+    assert first.tilt_deg is None and last.zero_deg is None and last.tilt_deg is not None and last.tilt_sigma_deg[0] > 0
+    assert 0.02 < arm.levels.angle_deg < 0.5 and 0.05 < arm.levels.length_mm < 1.5
+    assert arm.reach_error_corrected_95_mm < 0.5 * arm.reach_error_95_mm
+    assert arm.hand_eye_covariance.shape == arm.target_covariance.shape == (6, 6)
+    # Where the board is seen in views that the calibration does not have, by corrected poses and by reported ones.
+    middle = np.array([*POINTS.mean(axis=0), 1.0])
+
+    def off_mm(base_from_tip, hand_eye, target):
+        predicted = [inverse(hand_eye) @ inverse(p) @ target @ middle for p in base_from_tip]
+        squares = [np.sum((p - look @ middle)[:3] ** 2) for p, look in zip(predicted, fresh.camera_from_target)]
+        return 1e3 * np.sqrt(np.mean(squares))
+
+    actual = result.actual(there)
+    corrected = off_mm(actual.base_from_tip, arm.hand_eye, arm.target)
+    reported = off_mm(fresh.base_from_tip, result.tip_from_camera, result.base_from_target)
+    assert corrected < 0.3 * reported, (corrected, reported)
+    # The command is by the controller's own kinematics, and takes the tip where it is wanted.
+    wanted = fresh.base_from_tip
+    command = result.correct(wanted, near=there)
+    assert command.joints.shape == (10, 6) and command.base_from_tip.shape == (10, 4, 4) and command.error_95_mm.shape == (10,)
+    near(command.base_from_tip, [simulated.forward(simulated.UR5E, q) for q in command.joints], 1e-5)
+    near(result.actual(command.joints).base_from_tip, wanted, 1e-8)
+    assert np.abs(command.base_from_tip[:, :3, 3] - wanted[:, :3, 3]).max() > 1e-4
+    one = result.correct(wanted[4], near=there[4])
+    near(one.joints, command.joints[4], 1e-12)
+    assert one.joints.shape == (6,) and one.base_from_tip.shape == (4, 4) and one.error_95_mm == command.error_95_mm[4]
+    where = result.actual(there[4])
+    near(where.base_from_tip, actual.base_from_tip[4], 0)
+    assert where.error_95_mm == actual.error_95_mm[4] > 0
+    # Each without a place to be near is near the one before.
+    chain = result.correct(wanted, near=there[0])
+    near(chain.joints[0], command.joints[0], 1e-12)
+    near(result.actual(chain.joints).base_from_tip, wanted, 1e-8)
+    assert result.correct(wanted[0]).joints.shape == (6,)
+
+
+@check
+def the_arm_is_named_by_its_rows_or_its_file_as_well(rng):
+    s, joints, _, result = arm_case()
+    path = os.path.join(sys.argv[3], "arm.urdf")
+    with open(path, "w") as file:
+        file.write(urdf_of_rows(simulated.UR5E))
+    for arm in (simulated.UR5E, simulated.UR5E.tolist(), path, (path, "l0", "l6")):
+        other = handeye.calibrate(**of_arm(s), joints=list(joints), arm=arm)
+        near(other.arm.hand_eye, result.arm.hand_eye, 1e-9)
+        near(other.tip_from_camera, result.tip_from_camera, 1e-9)
+    assert handeye.doctor(**of_arm(s), joints=joints, arm="ur5e").findings is not None
+    # Without its joints the arm is not known.
+    plain = handeye.calibrate(**of_arm(s))
+    assert plain.arm is None
+
+
+@check
+def a_result_is_read_again_and_corrects_as_before(rng):
+    import jsonschema
+
+    s, joints, (_, there), result = arm_case()
+    with open(sys.argv[2]) as file:
+        jsonschema.validate(result.document, json.load(file))
+    folder = os.path.join(sys.argv[3], "kept")
+    os.makedirs(folder)
+    path = os.path.join(folder, "result.json")
+    with open(path, "w") as file:
+        file.write(result.to_json())
+    for place in (path, folder):
+        again = handeye.load_calibration(place)
+        assert again.document == result.document and again.to_json() == result.to_json()
+        near(again.actual(there).base_from_tip, result.actual(there).base_from_tip, 0)
+        assert again.arm.reach_error_95_mm == result.arm.reach_error_95_mm
+    raises(handeye.InputError, ["nowhere.json"], handeye.load_calibration, os.path.join(folder, "nowhere.json"))
+    with open(os.path.join(folder, "other.json"), "w") as file:
+        file.write("{}")
+    raises(handeye.InputError, ["other.json", "not a calibration result"], handeye.load_calibration,
+           os.path.join(folder, "other.json"))
+    document = json.loads(result.to_json())
+    document["arm"]["contradicted"] = True
+    with open(path, "w") as file:
+        json.dump(document, file)
+    doubted = handeye.load_calibration(path)
+    for call in (lambda: doubted.actual(there), lambda: doubted.correct(s.base_from_tip[0], near=joints[0])):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            call()
+        assert [w.category for w in said] == [handeye.CalibrationWarning] and "do not correct" in str(said[0].message)
+        assert said[0].filename == __file__
+
+
+@check
+def what_is_wrong_about_an_arm_says_what_to_do(rng):
+    s, joints, (fresh, there), result = arm_case()
+    bad = lambda words, **change: raises(
+        handeye.InputError, words, handeye.calibrate, **{**of_arm(s), "joints": joints, "arm": "ur5e", **change})
+    bad(["joints without arm", "both or neither"], arm=None)
+    bad(["arm without joints", "both or neither"], joints=None)
+    bad(["24 in joints", "25 in base_from_tip"], joints=joints[:24])
+    bad(["shape (6,)", "(N, n)"], joints=joints[0])
+    bad(["7 values", "6 joints"], joints=np.hstack([joints, joints[:, :1]]))
+    bad(['"ur6"', "ur5e", "URDF"], arm="ur6")
+    bad(["shape (6, 3)", "(n, 4)"], arm=simulated.UR5E[:, :3])
+    bad(["nowhere.urdf"], arm="nowhere.urdf")
+    spoilt = joints.copy()
+    spoilt[3, 2] = np.nan
+    bad(["joints of view \"view 3\"", "not finite"], joints=spoilt)
+    bad(["do not belong to the poses", "unit"], joints=np.degrees(joints))
+    few = {key: value[:2] if key in ("corners", "base_from_tip") else value for key, value in of_arm(s).items()}
+    raises(handeye.CalibrationError, ["at least 3"], handeye.calibrate, **few, joints=joints[:2], arm="ur5e")
+    raises(handeye.InputError, ["base_from_tip is missing"], handeye.calibrate, corners=s.corners, target=BOARD,
+           image_size=SIZE, joints=joints, arm="ur5e")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        handeye.doctor(**of_arm(s), joints=np.degrees(joints), arm="ur5e")
+    assert [w.category for w in said] == [handeye.CalibrationWarning] and "are not used" in str(said[0].message)
+    assert said[0].filename == __file__
+    # A controller that counts with its factory calibration: there is no chain to correct by.
+    other = [simulated.forward(simulated.real_arm(np.random.default_rng(1)), q) for q in joints]
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        result_of_other = handeye.calibrate(**{**of_arm(s), "base_from_tip": other}, joints=joints, arm="ur5e")
+    assert result_of_other.arm is None and "factory calibration" in str(said[0].message) and said[0].filename == __file__
+    for call in (lambda: result_of_other.correct(s.base_from_tip[0]), lambda: result_of_other.actual(joints)):
+        raises(handeye.InputError, ["no errors of an arm", "joints= and arm="], call)
+    raises(handeye.InputError, ["shape (3, 4)"], result.correct, s.base_from_tip[0][:3])
+    raises(handeye.InputError, ["near has shape (5,)", "(6,)"], result.correct, s.base_from_tip[0], near=joints[0][:5])
+    raises(handeye.InputError, ["joints have shape (25, 5)"], result.actual, joints[:, :5])
+    raises(handeye.InputError, ["joints[3]", "not finite"], result.actual, spoilt)
+    far = np.array(s.base_from_tip[:4])
+    far[2, 0, 3] = 3.0
+    raises(handeye.InputError, ["pose[2]", "closer"], result.correct, far, near=joints[0])
+    raises(handeye.InputError, ["pose: "], result.correct, far[2], near=joints[0])
+    far[2] = far[2] * [1, 1, -1, 1]
+    raises(handeye.InputError, ["pose[2]", "mirrors"], result.correct, far, near=joints[0])
+
+
+@check
+def an_arm_in_a_folder_solves_and_corrects_as_on_the_command_line(rng):
+    binary, path = sys.argv[1], os.path.join(sys.argv[3], "with_arm")
+    s, joints, (fresh, there), _ = arm_case()
+    write_folder(path, s, joints=joints)
+    # 0.3 mm is the goal of the command line.
+    result = handeye.calibrate(handeye.load_dataset(path), goal_mm=0.3)
+    output = path + ".json"
+    subprocess.run([binary, "calibrate", path, "--quiet", "--json", output], check=True, stdout=subprocess.DEVNULL)
+    with open(output) as file:
+        assert json.load(file) == json.loads(result.to_json())
+    assert result.arm is not None and result.arm.reach_error_95_mm > result.arm.reach_error_corrected_95_mm > 0
+    # The command line reads poses and joint values to be near from standard input.
+    command = result.correct(fresh.base_from_tip, near=there)
+    rows = ["x,y,z,qx,qy,qz,qw,q1,q2,q3,q4,q5,q6"]
+    for p, q in zip(fresh.base_from_tip, there):
+        rows.append(",".join(repr(float(v)) for v in [*p[:3, 3], *quaternion(p), *q]))
+    run = lambda text, *options: json.loads(subprocess.run(
+        [binary, "correct", output, "-", *options, "--json", "-"], check=True, input="\n".join(text), text=True,
+        stdout=subprocess.PIPE).stdout)
+    answers = run(rows)
+    near([a["joints_rad"] for a in answers], command.joints, 1e-9)
+    near([a["translation_m"] for a in answers], command.base_from_tip[:, :3, 3], 1e-9)
+    near([a["error_95_mm"] for a in answers], command.error_95_mm, 1e-6)
+    rows = ["q1,q2,q3,q4,q5,q6", *(",".join(repr(float(v)) for v in q) for q in there)]
+    answers = run(rows, "--from-reported")
+    near([a["translation_m"] for a in answers], result.actual(there).base_from_tip[:, :3, 3], 1e-9)
+
+
+def quaternion(p):
+    """x y z w, by the largest of them."""
+    m = p[:3, :3]
+    squares = np.array([1 + m[0, 0] - m[1, 1] - m[2, 2], 1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2],
+                        1 + np.trace(m)])
+    rows = np.array([
+        [squares[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
+        [m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
+        [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]],
+        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]],
+    ])
+    row = rows[np.argmax(squares)]
+    return row / np.linalg.norm(row)
 
 
 def main():

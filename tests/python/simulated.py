@@ -81,6 +81,66 @@ def session(rng, views, corner_px=0.0, robot_mm=0.0, robot_deg=0.0, camera_from_
     return Session(np.array(reported), seen, corners)
 
 
+UR5E = np.array([
+    [0.0, np.pi / 2, 0.1625, 0.0], [-0.425, 0.0, 0.0, 0.0], [-0.3922, 0.0, 0.0, 0.0],
+    [0.0, np.pi / 2, 0.1333, 0.0], [0.0, -np.pi / 2, 0.0997, 0.0], [0.0, 0.0, 0.0996, 0.0],
+])
+"""a, alpha, d, theta of each joint as the maker has them."""
+AT_EASE = np.array([0.2, -1.5, 1.6, -1.7, -1.6, 0.3])
+
+
+def forward(rows, joints):
+    """base_from_tip of an arm by its rows."""
+    out = np.eye(4)
+    for (a, alpha, d, theta), q in zip(rows, joints):
+        out = out @ pose([0, 0, q + theta], [0, 0, d]) @ pose([alpha, 0, 0], [a, 0, 0])
+    return out
+
+
+def inverse_kinematics(rows, wanted, start):
+    """Joint values by Newton's method, or None."""
+    joints = np.array(start)
+    for _ in range(50):
+        def off(q):
+            there = inverse(forward(rows, q)) @ wanted
+            turn = 0.5 * np.array([there[2, 1] - there[1, 2], there[0, 2] - there[2, 0], there[1, 0] - there[0, 1]])
+            return np.concatenate([there[:3, 3], turn])
+
+        now = off(joints)
+        if np.linalg.norm(now) < 1e-12:
+            return joints if np.trace(inverse(forward(rows, joints)) @ wanted) > 3.9 else None
+        slope = np.stack([(off(joints + step) - now) / 1e-7 for step in np.eye(6) * 1e-7], axis=1)
+        step = np.linalg.lstsq(slope, -now, rcond=1e-6)[0]
+        joints = joints + step * min(1.0, 0.5 / np.linalg.norm(step))
+    return None
+
+
+def real_arm(rng, angle_deg=0.1, length_mm=0.3):
+    """Rows of an arm that is not quite what its maker says."""
+    errors = rng.normal(size=UR5E.shape) * [length_mm * 1e-3, np.radians(angle_deg), length_mm * 1e-3, np.radians(angle_deg)]
+    return UR5E + errors
+
+
+def arm_session(rng, views, rows, corner_px=0.1):
+    """A session of an arm with these rows whose controller counts with those of the maker, and its joint values, (N, 6)."""
+    reported, seen, joints, corners = [], [], [], []
+    while len(joints) < views:
+        wanted = BASE_FROM_TARGET @ inverse(looks(rng, 1)[0]) @ inverse(TIP_FROM_CAMERA)
+        found = inverse_kinematics(UR5E, wanted, AT_EASE)
+        if found is None:
+            continue
+        look = inverse(TIP_FROM_CAMERA) @ inverse(forward(rows, found)) @ BASE_FROM_TARGET
+        points = POINTS @ look[:3, :3].T + look[:3, 3]
+        pixels = points[:, :2] / points[:, 2:] * MATRIX[0, 0] + MATRIX[:2, 2]
+        if not ((pixels > 5) & (pixels < np.array(SIZE) - 6)).all():
+            continue
+        joints.append(found)
+        reported.append(forward(UR5E, found))
+        seen.append(look)
+        corners.append(pixels + rng.normal(size=pixels.shape) * corner_px)
+    return Session(np.array(reported), np.array(seen), corners), np.array(joints)
+
+
 def error(tip_from_camera, truth=TIP_FROM_CAMERA):
     """Of a hand-eye transform: millimetres, degrees."""
     return 1e3 * np.linalg.norm(tip_from_camera[:3, 3] - truth[:3, 3]), angle_deg(tip_from_camera, truth)

@@ -1,14 +1,15 @@
 //! `handeye correct`: what to command so that the tip gets where it shall be, by the errors of the arm that a calibration found.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use clap::Args;
-use handeye_dataset::correct_table::{read_joint_values, read_wanted};
+use handeye_dataset::correct_table::CorrectTable;
 use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_workbench::arguments::heading;
+use serde::Serialize;
 
 use super::export::read_result;
 use super::output::Output;
@@ -17,7 +18,8 @@ use crate::{Failure, out};
 /// At the end of its help.
 pub const EXAMPLES: &str = "Examples:
   handeye correct result.json wanted.csv --out commands.csv
-  handeye correct result.json reported.csv --from-reported --out real.csv";
+  handeye correct result.json reported.csv --from-reported --out real.csv
+  my_planner | handeye correct result.json - --json -";
 
 /// Options of `handeye correct`.
 #[derive(Debug, Args)]
@@ -25,7 +27,7 @@ pub struct CorrectArgs {
     /// Solved session or dataset (a folder with result.json or calibration.json), or a result JSON, of an arm whose joints are known.
     calibration: PathBuf,
     /// CSV with a row for each pose that the tip shall reach: x,y,z,qx,qy,qz,qw in the base, metres; q1,q2,… may follow, joint
-    /// values in radians near which the arm shall be.
+    /// values in radians near which the arm shall be. `-` for standard input.
     table: PathBuf,
     /// The rows are joint values q1,q2,… instead, radians, and the answer is where the tip really is.
     #[arg(long, help_heading = heading::POSES)]
@@ -33,11 +35,34 @@ pub struct CorrectArgs {
     /// Write the answer to this file instead of standard output.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     out: Option<Output>,
+    /// Write the answer as JSON to this file; `-` for standard output instead of the table.
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    json: Option<Output>,
 }
 
-/// Writes the table: joint values, the pose by the controller's own kinematics (with `--from-reported` the real one), and how far off
-/// the tip is expected to be at the most. Moves nothing.
+/// What is answered for a row.
+#[derive(Debug, Serialize)]
+struct Answer {
+    joints_rad: Vec<f64>,
+    translation_m: [f64; 3],
+    rotation_xyzw: [f64; 4],
+    error_95_mm: f64,
+}
+
+impl Answer {
+    fn new(joints_rad: Vec<f64>, pose: &Pose<Base, Tip>, error_95_m: f64) -> Self {
+        let (translation_m, rotation_xyzw) = (pose.translation().into(), pose.xyzw());
+        Self { joints_rad, translation_m, rotation_xyzw, error_95_mm: error_95_m * 1e3 }
+    }
+}
+
+/// Writes the answers: joint values, the pose by the controller's own kinematics (with `--from-reported` the real one), and how far
+/// off the tip is expected to be at the most. Moves nothing.
 pub fn run(args: &CorrectArgs) -> Result<(), Failure> {
+    let json_is_printed = args.json.as_ref().is_some_and(Output::is_standard);
+    if json_is_printed && args.out.as_ref().is_some_and(Output::is_standard) {
+        return Err(Failure::unusable(anyhow!("--json and --out both go to standard output: give one of them a file")));
+    }
     let result = read_result(&args.calibration)?;
     let arm = result.arm.as_ref().ok_or_else(|| {
         Failure::unusable(anyhow!(
@@ -53,59 +78,64 @@ pub fn run(args: &CorrectArgs) -> Result<(), Failure> {
         );
     }
     let corrected = arm.corrected_arm().map_err(Failure::unusable)?;
-    let text = if args.from_reported { actual(&corrected, args)? } else { commands(&corrected, args)? };
+    let answers = if args.from_reported { actual(&corrected, args)? } else { commands(&corrected, args)? };
+    if let Some(output) = &args.json {
+        let text = serde_json::to_string_pretty(&answers).map_err(Failure::failed)?;
+        output.write((text + "\n").as_bytes())?;
+    }
     match &args.out {
-        Some(output) => output.write(text.as_bytes()),
-        None => out::print(&text),
+        Some(output) => output.write(table(&answers, corrected.arm.joint_count()).as_bytes()),
+        None if json_is_printed => Ok(()),
+        None => out::print(&table(&answers, corrected.arm.joint_count())),
     }
 }
 
-fn commands(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<String, Failure> {
-    let count = corrected.arm.joint_count();
-    let mut text = header(count);
-    let mut near = middle(corrected);
-    for wanted in read_wanted(&args.table, count).map_err(Failure::unusable)? {
+fn read(args: &CorrectArgs) -> Result<CorrectTable, Failure> {
+    let table = if args.table == Path::new("-") {
+        CorrectTable::of_reader(Path::new("standard input"), std::io::stdin().lock())
+    } else {
+        CorrectTable::open(&args.table)
+    };
+    table.map_err(Failure::unusable)
+}
+
+fn commands(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<Vec<Answer>, Failure> {
+    let mut near = corrected.middle_rad();
+    let mut answers = Vec::new();
+    for wanted in read(args)?.wanted(corrected.arm.joint_count()).map_err(Failure::unusable)? {
         near = wanted.near_rad.unwrap_or(near);
         let command = corrected
             .command(&wanted.base_from_tip, &near)
             .map_err(|error| Failure::unusable(anyhow!("{}, row {}: {error}", args.table.display(), wanted.line)))?;
-        row(&mut text, &command.joints_rad, &command.base_from_tip, command.error_95_m);
-        near = command.joints_rad;
+        near.clone_from(&command.joints_rad);
+        answers.push(Answer::new(command.joints_rad, &command.base_from_tip, command.error_95_m));
     }
-    Ok(text)
+    Ok(answers)
 }
 
-fn actual(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<String, Failure> {
-    let count = corrected.arm.joint_count();
-    let mut text = header(count);
-    for (line, joints_rad) in read_joint_values(&args.table, count).map_err(Failure::unusable)? {
+fn actual(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<Vec<Answer>, Failure> {
+    let mut answers = Vec::new();
+    for (line, joints_rad) in read(args)?.joint_values(corrected.arm.joint_count()).map_err(Failure::unusable)? {
         let at = |error| Failure::unusable(anyhow!("{}, row {line}: {error}", args.table.display()));
         let pose = corrected.actual(&joints_rad).map_err(at)?;
-        row(&mut text, &joints_rad, &pose, corrected.error_95_m(&joints_rad).map_err(at)?);
+        let error_95_m = corrected.error_95_m(&joints_rad).map_err(at)?;
+        answers.push(Answer::new(joints_rad, &pose, error_95_m));
     }
-    Ok(text)
+    Ok(answers)
 }
 
-/// Where the search for a first row begins that says nothing: in the middle of what the joints can do.
-fn middle(corrected: &CorrectedArm) -> Vec<f64> {
-    let middle = |range: handeye_arm::JointRange| {
-        if range.min.is_finite() && range.max.is_finite() { f64::midpoint(range.min, range.max) } else { 0.0 }
-    };
-    corrected.arm.ranges().into_iter().map(middle).collect()
-}
-
-fn header(joints: usize) -> String {
+fn table(answers: &[Answer], joints: usize) -> String {
     let joints = (1..=joints).map(|joint| format!("q{joint}"));
     let rest = ["x", "y", "z", "qx", "qy", "qz", "qw", "error_95_mm"].map(str::to_owned);
-    joints.chain(rest).collect::<Vec<_>>().join(",") + "\n"
-}
-
-fn row(text: &mut String, joints_rad: &[f64], pose: &Pose<Base, Tip>, error_95_m: f64) {
-    for value in joints_rad.iter().chain(pose.translation().iter()).chain(&pose.xyzw()) {
-        // A nanometre and a nanoradian, and no minus before what is nothing.
-        let _infallible = write!(text, "{:.9},", value + 0.0);
+    let mut text = joints.chain(rest).collect::<Vec<_>>().join(",") + "\n";
+    for answer in answers {
+        for value in answer.joints_rad.iter().chain(&answer.translation_m).chain(&answer.rotation_xyzw) {
+            // A nanometre and a nanoradian, and no minus before what is nothing.
+            let _infallible = write!(text, "{:.9},", value + 0.0);
+        }
+        let _infallible = writeln!(text, "{:.3}", answer.error_95_mm);
     }
-    let _infallible = writeln!(text, "{:.3}", error_95_m * 1e3);
+    text
 }
 
 #[cfg(test)]
@@ -137,11 +167,22 @@ mod tests {
             table: at(table),
             from_reported,
             out: Some(at(out).into_os_string().into()),
+            json: Some(at(&format!("{out}.json")).into_os_string().into()),
         };
         run(&arguments("wanted.csv", false, "commands.csv")).expect("within reach");
         let command = numbers(&at("commands.csv"));
         assert_eq!(command.len(), 6 + 7 + 1);
         assert!((command[6] - t.x).abs() > 1e-5, "the errors are seen");
+        let json = std::fs::read_to_string(at("commands.csv.json")).expect("an answer");
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        assert_eq!(json.as_array().map(Vec::len), Some(1));
+        let number = |path: &str| json.pointer(path).and_then(serde_json::Value::as_f64).expect(path);
+        let paths = (0..6).map(|i| format!("/0/joints_rad/{i}")).chain((0..3).map(|i| format!("/0/translation_m/{i}")));
+        let paths = paths.chain((0..4).map(|i| format!("/0/rotation_xyzw/{i}")));
+        for (path, value) in paths.zip(&command) {
+            assert!((number(&path) - value).abs() < 1e-9, "{path}: {json}");
+        }
+        assert!((number("/0/error_95_mm") - command[13]).abs() < 1e-3, "{json}");
         let joints: Vec<String> = command[..6].iter().map(f64::to_string).collect();
         std::fs::write(at("reported.csv"), format!("q1,q2,q3,q4,q5,q6\n{}\n", joints.join(","))).expect("written");
         run(&arguments("reported.csv", true, "real.csv")).expect("joints");
@@ -152,6 +193,13 @@ mod tests {
         std::fs::write(at("far.csv"), wanted.replacen(&format!("\n{}", t.x), "\n9", 1)).expect("written");
         let error = run(&arguments("far.csv", false, "none.csv")).expect_err("out of reach");
         assert!(format!("{error}").contains("far.csv, row 2"), "{error}");
-        assert!(!at("none.csv").exists());
+        assert!(!at("none.csv").exists() && !at("none.csv.json").exists());
+        let both = CorrectArgs {
+            out: Some(std::ffi::OsString::from("-").into()),
+            json: Some(std::ffi::OsString::from("-").into()),
+            ..arguments("wanted.csv", false, "none.csv")
+        };
+        let error = run(&both).expect_err("one standard output");
+        assert!(format!("{error}").contains("give one of them a file"), "{error}");
     }
 }

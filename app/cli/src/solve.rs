@@ -9,15 +9,12 @@ use handeye_dataset::{DESCRIPTION, Dataset, DatasetError, DatasetProblem};
 use handeye_estimate::diagnose::doctor::diagnose;
 use handeye_estimate::diagnose::findings::{Finding, FindingCode, FindingOptions};
 use handeye_estimate::handeye::{HandEyeError, Mode};
-use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::{CalibrateError, Method, Observations, ObservedView, Options};
 use handeye_export::{ExportInput, ExportNames};
 use handeye_geometry::progress::CancelToken;
 use handeye_result::guided_record::GuidedRecord;
 use handeye_result::{CalibrationResult, ViewRecordStatus};
-use handeye_session::{
-    self as session, ArmOfViews, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations,
-};
+use handeye_session::{self as session, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations};
 
 use super::output::Output;
 use super::{Failure, out};
@@ -66,12 +63,7 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
         };
         let captures = observations.views.iter().map(id_of).collect();
         let sha256 = dataset.input_sha256().map_err(Failure::unusable)?;
-        let placement = dataset.arm.as_ref().and_then(|arm| arm.placement.as_ref().ok());
-        let arm = placement.map(|placement| ArmOfViews {
-            placement: placement.clone(),
-            tool_m: dataset.tool_m.unwrap_or([0.0, 0.0, USUAL_TOOL_M]),
-            joints_rad: dataset.entries.iter().map(|entry| entry.joints_rad.clone()).collect(),
-        });
+        let arm = dataset.arm_of_views().and_then(Result::ok);
         let seen = SessionObservations { observations, captures, verification: Vec::new(), arm };
         Input { document: Arc::new(document), seen, sha256 }
     };

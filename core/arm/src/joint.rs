@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// How a joint moves what is behind it.
@@ -87,5 +87,11 @@ impl Joint {
                 Isometry3::from_parts((self.axis.into_inner() * value).into(), UnitQuaternion::identity())
             }
         }
+    }
+
+    /// `joint_from_axis`: the shortest turn that has z along the axis.
+    pub fn joint_from_axis(&self) -> UnitQuaternion<f64> {
+        let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &self.axis).unwrap_or_else(half_turn)
     }
 }

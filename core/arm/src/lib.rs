@@ -54,7 +54,7 @@ pub mod testing;
 pub mod urdf;
 mod values;
 
-use nalgebra::{Isometry3, Matrix6xX, UnitQuaternion, UnitVector3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6xX, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -157,6 +157,29 @@ impl Arm {
         Ok(self)
     }
 
+    /// The same arm with its joints elsewhere: what entry `j` says of joint `j` in its frame at rest with z along the axis, as
+    /// [`Self::tip_from_joints`] has it. The axes stay what they are in that frame.
+    ///
+    /// # Errors
+    /// [`ArmError::WrongCount`], and [`ArmError::BadJoint`] for a place that no joint has.
+    pub fn displaced(&self, joint_from_moved: &[Isometry3<f64>]) -> Result<Self, ArmError> {
+        if joint_from_moved.len() != self.joints.len() {
+            return Err(ArmError::WrongCount { got: joint_from_moved.len(), need: self.joints.len() });
+        }
+        let mut joints = self.joints.clone();
+        for (joint, moved) in joints.iter_mut().zip(joint_from_moved) {
+            let joint_from_axis = joint.joint_from_axis();
+            joint.previous_from_joint = joint.previous_from_joint * joint_from_axis * moved * joint_from_axis.inverse();
+        }
+        let arm = Self::new(joints, self.last_from_flange)?;
+        Ok(arm.mounted(self.base_from_first, self.flange_from_tip))
+    }
+
+    /// The end of the chain in the frame that the last joint carries.
+    pub fn last_from_flange(&self) -> &Isometry3<f64> {
+        &self.last_from_flange
+    }
+
     /// The ranges of all joints, from the base to the tip.
     pub fn ranges(&self) -> Vec<JointRange> {
         self.joints.iter().map(|joint| joint.range).collect()
@@ -244,7 +267,7 @@ impl Arm {
         let tip_from_base = base_from_tip.isometry().inverse();
         let mut frames = Vec::with_capacity(joints.len());
         self.walk(joints, |i, base_from_joint, _| {
-            frames.push(tip_from_base * base_from_joint * about_z(&self.joints[i].axis));
+            frames.push(tip_from_base * base_from_joint * self.joints[i].joint_from_axis());
         });
         Ok(frames)
     }
@@ -277,12 +300,6 @@ impl Arm {
         let base_from_flange = self.walk(joints, |i, at_rest, _| axes.push(Axis::of(&self.joints[i], at_rest)));
         (axes, base_from_flange)
     }
-}
-
-/// `joint_from_axis`: the shortest turn that has z along an axis.
-fn about_z(axis: &UnitVector3<f64>) -> UnitQuaternion<f64> {
-    let half_turn = || UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), axis).unwrap_or_else(half_turn)
 }
 
 /// What no place on an arm has.

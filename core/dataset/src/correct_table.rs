@@ -1,5 +1,6 @@
 //! Tables of poses that a tip shall reach, and of joint values that a robot reports.
 
+use std::io::Read;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3};
@@ -24,69 +25,83 @@ pub struct WantedPose {
 
 const POSE: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 
-/// Reads the poses of a table `x,y,z,qx,qy,qz,qw`, metres, of the tip in the base; `q1` and so on may follow, radians.
-///
-/// # Errors
-/// [`DatasetError`] names file and row.
-pub fn read_wanted(path: &Path, joints: usize) -> Result<Vec<WantedPose>, DatasetError> {
-    let file = open(path)?;
-    let of_joints = &COLUMNS[..joints.min(COLUMNS.len())];
-    let headers = [POSE.to_vec(), [&POSE[..], of_joints].concat()];
-    let table = Table::parse(&file, &headers, "one row per pose that the tip shall reach is needed")?;
-    let wanted = table.rows.iter().map(|row| {
-        let [x, y, z, qx, qy, qz, qw] = table.numbers::<7>(row, 0)?;
-        let rotation = unit_quaternion(Quaternion::new(qw, qx, qy, qz)).map_err(|problem| table.fail(row, problem))?;
-        let near = (POSE.len()..table.column_count()).map(|column| table.number(row, column));
-        let near = near.collect::<Result<Vec<_>, DatasetError>>()?;
-        Ok(WantedPose {
-            line: row.line,
-            base_from_tip: Pose::from_isometry(Isometry3::from_parts(Translation3::new(x, y, z), rotation)),
-            near_rad: Some(near).filter(|near| !near.is_empty()),
-        })
-    });
-    wanted.collect()
-}
+/// A table as it was read.
+pub struct CorrectTable(TextFile);
 
-/// Reads the joint values of a table `q1,q2,…`, radians, with their line in it.
-///
-/// # Errors
-/// [`DatasetError`] names file and row.
-pub fn read_joint_values(path: &Path, joints: usize) -> Result<Vec<(usize, Vec<f64>)>, DatasetError> {
-    let file = open(path)?;
-    let header = COLUMNS[..joints.min(COLUMNS.len())].to_vec();
-    let table = Table::parse(&file, &[header], "one row of joint values per reported pose is needed")?;
-    let values = table.rows.iter().map(|row| {
-        let values = (0..table.column_count()).map(|column| table.number(row, column));
-        Ok((row.line, values.collect::<Result<Vec<_>, DatasetError>>()?))
-    });
-    values.collect()
-}
+impl CorrectTable {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`DatasetError`] where it is none, or no text.
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        let unnamed = || DatasetError::new(path, None, DatasetProblem::Unreadable("it is not a file".into()));
+        let name = path.file_name().ok_or_else(unnamed)?;
+        TextFile::read(path.parent().unwrap_or(Path::new("")), Path::new(name)).map(Self)
+    }
 
-fn open(path: &Path) -> Result<TextFile, DatasetError> {
-    let unnamed = || DatasetError::new(path, None, DatasetProblem::Unreadable("it is not a file".into()));
-    let name = path.file_name().ok_or_else(unnamed)?;
-    TextFile::read(path.parent().unwrap_or(Path::new("")), Path::new(name))
+    /// Reads what another program writes, to its end; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// [`DatasetError`] where it cannot be read, or is no text.
+    pub fn of_reader(name: &Path, reader: impl Read) -> Result<Self, DatasetError> {
+        TextFile::of_reader(name, reader).map(Self)
+    }
+
+    /// The poses of a table `x,y,z,qx,qy,qz,qw`, metres, of the tip in the base; `q1` and so on may follow, radians.
+    ///
+    /// # Errors
+    /// [`DatasetError`] names file and row.
+    pub fn wanted(&self, joints: usize) -> Result<Vec<WantedPose>, DatasetError> {
+        let of_joints = &COLUMNS[..joints.min(COLUMNS.len())];
+        let headers = [POSE.to_vec(), [&POSE[..], of_joints].concat()];
+        let table = Table::parse(&self.0, &headers, "one row per pose that the tip shall reach is needed")?;
+        let wanted = table.rows.iter().map(|row| {
+            let [x, y, z, qx, qy, qz, qw] = table.numbers::<7>(row, 0)?;
+            let rotation =
+                unit_quaternion(Quaternion::new(qw, qx, qy, qz)).map_err(|problem| table.fail(row, problem))?;
+            let near = (POSE.len()..table.column_count()).map(|column| table.number(row, column));
+            let near = near.collect::<Result<Vec<_>, DatasetError>>()?;
+            Ok(WantedPose {
+                line: row.line,
+                base_from_tip: Pose::from_isometry(Isometry3::from_parts(Translation3::new(x, y, z), rotation)),
+                near_rad: Some(near).filter(|near| !near.is_empty()),
+            })
+        });
+        wanted.collect()
+    }
+
+    /// The joint values of a table `q1,q2,…`, radians, with their line in it.
+    ///
+    /// # Errors
+    /// [`DatasetError`] names file and row.
+    pub fn joint_values(&self, joints: usize) -> Result<Vec<(usize, Vec<f64>)>, DatasetError> {
+        let header = COLUMNS[..joints.min(COLUMNS.len())].to_vec();
+        let table = Table::parse(&self.0, &[header], "one row of joint values per reported pose is needed")?;
+        let values = table.rows.iter().map(|row| {
+            let values = (0..table.column_count()).map(|column| table.number(row, column));
+            Ok((row.line, values.collect::<Result<Vec<_>, DatasetError>>()?))
+        });
+        values.collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn written(text: &str) -> tempfile::NamedTempFile {
-        let file = tempfile::NamedTempFile::new().expect("a file");
-        std::fs::write(file.path(), text).expect("written");
-        file
+    fn table(text: &str) -> CorrectTable {
+        CorrectTable::of_reader(Path::new("-"), text.as_bytes()).expect("text")
     }
 
     #[test]
     fn poses_are_read_with_and_without_joint_values_to_be_near() {
-        let file = written("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.2,0,0,0,1\n");
-        let read = read_wanted(file.path(), 2).expect("a table");
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        std::fs::write(file.path(), "x,y,z,qx,qy,qz,qw\n0.4,0.1,0.2,0,0,0,1\n").expect("written");
+        let read = CorrectTable::open(file.path()).expect("text").wanted(2).expect("a table");
         assert_eq!((read.len(), read[0].line, read[0].near_rad.clone()), (1, 2, None));
-        let file = written("x,y,z,qx,qy,qz,qw,q1,q2\n0.4,0.1,0.2,0,0,0,1,0.5,-0.5\n");
-        assert_eq!(read_wanted(file.path(), 2).expect("a table")[0].near_rad, Some(vec![0.5, -0.5]));
-        let file = written("q1,q2\n0.5,-0.5\n\n1,2\n");
-        let read = read_joint_values(file.path(), 2).expect("a table");
+        let read = table("x,y,z,qx,qy,qz,qw,q1,q2\n0.4,0.1,0.2,0,0,0,1,0.5,-0.5\n").wanted(2).expect("a table");
+        assert_eq!(read[0].near_rad, Some(vec![0.5, -0.5]));
+        let read = table("q1,q2\n0.5,-0.5\n\n1,2\n").joint_values(2).expect("a table");
         assert_eq!(read, [(2, vec![0.5, -0.5]), (4, vec![1.0, 2.0])]);
     }
 
@@ -99,8 +114,9 @@ mod tests {
             ("x,y,z,qx,qy,qz,qw,q1\n0,0,0,0,0,0,1,0\n", Some(1)),
             ("", None),
         ] {
-            let error = read_wanted(written(text).path(), 2).expect_err(text);
+            let error = table(text).wanted(2).expect_err(text);
             assert_eq!(error.row, row, "{error}");
+            assert_eq!(error.file, Path::new("-"), "{error}");
         }
     }
 }

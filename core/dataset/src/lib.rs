@@ -62,6 +62,8 @@ use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use handeye_estimate::handeye::Mode;
+use handeye_estimate::placement::{ArmOfViews, PlacementError};
+use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_files::bounds::Bounds;
 pub use handeye_files::own_folder::DESCRIPTION;
 use handeye_geometry::camera::{Distortion, Intrinsics};
@@ -218,6 +220,19 @@ impl Dataset {
             #[cfg(feature = "digest")]
             text_sha256,
         })
+    }
+
+    /// The arm in the views, in the order of the entries, with the tool; `None` without `[robot.arm]`.
+    ///
+    /// # Errors
+    /// Why its joint angles are not used.
+    pub fn arm_of_views(&self) -> Option<Result<ArmOfViews, PlacementError>> {
+        let of = |placement| ArmOfViews {
+            placement,
+            tool_m: self.tool_m.unwrap_or([0.0, 0.0, USUAL_TOOL_M]),
+            joints_rad: self.entries.iter().map(|entry| entry.joints_rad.clone()).collect(),
+        };
+        Some(self.arm.as_ref()?.placement.clone().map(of))
     }
 
     /// Names in the data set and paths of its text files, as they begin the listing of `input_sha256`.

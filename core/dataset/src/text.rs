@@ -1,6 +1,7 @@
 //! Text files of a data set, and tables with rows that are counted as an editor counts them.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use super::error::{DatasetError, DatasetProblem, shown};
@@ -34,6 +35,23 @@ impl TextFile {
             return Err(fail(DatasetProblem::FileTooLarge { bytes: metadata.len(), limit: MAX_TEXT_BYTES }));
         }
         let bytes = fs::read(path).map_err(unreadable)?;
+        Self::of_bytes(path, name, bytes)
+    }
+
+    /// Reads what comes from somewhere else than a file, to its end; `path` is what messages call it.
+    pub fn of_reader(path: &Path, reader: impl Read) -> Result<Self, DatasetError> {
+        let fail = |problem| DatasetError::new(path, None, problem);
+        let mut bytes = Vec::new();
+        let read = reader.take(MAX_TEXT_BYTES + 1).read_to_end(&mut bytes);
+        read.map_err(|e| fail(DatasetProblem::Unreadable(one_line(&e))))?;
+        let length = bytes.len() as u64;
+        if length > MAX_TEXT_BYTES {
+            return Err(fail(DatasetProblem::FileTooLarge { bytes: length, limit: MAX_TEXT_BYTES }));
+        }
+        Self::of_bytes(path, path, bytes)
+    }
+
+    fn of_bytes(path: &Path, name: &Path, bytes: Vec<u8>) -> Result<Self, DatasetError> {
         #[cfg(feature = "digest")]
         let sha256 = <sha2::Sha256 as sha2::Digest>::digest(&bytes).into();
         let text = String::from_utf8(bytes).map_err(|e| {
@@ -42,7 +60,7 @@ impl TextFile {
         })?;
         let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
         Ok(Self {
-            path: path.clone(),
+            path: path.to_path_buf(),
             name: name.to_path_buf(),
             text,
             #[cfg(feature = "digest")]

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector6};
 
 use crate::arm_fit::ArmFit;
 use crate::handeye::joint::{ArmErrors, SmallSample};
-use handeye_arm::{Arm, ArmError, IkError};
+use handeye_arm::{Arm, ArmError, IkError, JointRange};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
 /// Steps of [`CorrectedArm::command`]. Each leaves of the distance what the errors of the arm are of its size: a few parts in a
@@ -86,6 +86,23 @@ impl CorrectedArm {
         Ok(Pose::from_isometry(reported.isometry() * self.errors.reported_from_true(&reported, &frames)))
     }
 
+    /// The chain with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what the joints give way
+    /// by under gravity, which no fixed chain has.
+    ///
+    /// # Errors
+    /// [`ArmError`] where the errors are no errors of an arm.
+    pub fn without_gravity(&self) -> Result<Arm, ArmError> {
+        self.arm.displaced(&self.errors.at_rest())
+    }
+
+    /// Joint values in the middle of what the joints can do, where a search may begin of which nothing else is known.
+    pub fn middle_rad(&self) -> Vec<f64> {
+        let middle = |range: JointRange| {
+            if range.min.is_finite() && range.max.is_finite() { f64::midpoint(range.min, range.max) } else { 0.0 }
+        };
+        self.arm.ranges().into_iter().map(middle).collect()
+    }
+
     /// How far the tip is from [`Self::actual`] at the most with a probability of 95 %, metres.
     ///
     /// # Errors
@@ -141,7 +158,7 @@ fn position(covariance: &Matrix6<f64>) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::handeye::joint::arm_parameters;
+    use crate::handeye::joint::{ArmParameter, LinkError, arm_parameters};
     use handeye_arm::ArmKind;
 
     fn corrected(degrees: f64) -> CorrectedArm {
@@ -168,6 +185,25 @@ mod tests {
             assert!(off_m < 1e-9 && off_rad < 1e-9, "{degrees}°: {off_m} m, {off_rad} rad");
             assert!(command.base_from_tip.distance_to(&wanted).0 > 1e-4, "the errors are seen");
             assert!(command.error_95_m > 2e-5 && command.error_95_m < 1e-3, "{}", command.error_95_m);
+        }
+    }
+
+    #[test]
+    fn the_chain_without_gravity_is_the_real_arm_where_nothing_gives_way() {
+        for arm in [ArmKind::Ur5e.arm(), handeye_arm::testing::UR5.arm().expect("an arm")] {
+            let rigid = |(parameter, value): (&ArmParameter, &f64)| {
+                if parameter.error == LinkError::Compliance { 0.0 } else { *value }
+            };
+            let values = arm_parameters(6).iter().zip(corrected(0.5).errors.values()).map(rigid).collect();
+            let errors = ArmErrors::new(6, values).expect("so many");
+            let mount = nalgebra::Isometry3::new([0.1, -0.2, 0.3].into(), [0.4, 1.2, -0.7].into());
+            let corrected = CorrectedArm { arm: arm.mounted(mount, mount.inverse()), errors, ..corrected(0.5) };
+            let chain = corrected.without_gravity().expect("an arm");
+            for q in [[0.0; 6], [0.3, -1.3, 1.7, -1.9, -1.6, 0.4], [-2.0, 0.4, 2.2, 1.1, 0.8, -3.0]] {
+                let (m, rad) = chain.forward(&q).expect("six").distance_to(&corrected.actual(&q).expect("six"));
+                assert!(m < 1e-12 && rad < 1e-7, "{m} m, {rad} rad");
+                assert!(chain.forward(&q).expect("six").distance_to(&corrected.arm.forward(&q).expect("six")).0 > 1e-4);
+            }
         }
     }
 

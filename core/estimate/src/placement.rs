@@ -85,6 +85,17 @@ pub struct Placement {
     pub misses: Vec<(f64, f64)>,
 }
 
+/// An arm, its tool, and its joints in the views of a calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmOfViews {
+    /// Where the views put it, and how far from them.
+    pub placement: Placement,
+    /// Where the tip of its tool is in the frame of the tip, metres.
+    pub tool_m: [f64; 3],
+    /// Its joint values in each view, radians; `None` where a view has none.
+    pub joints_rad: Vec<Option<Vec<f64>>>,
+}
+
 impl Placement {
     /// The joints at the tip in a view that need not be one of those that placed the arm.
     ///

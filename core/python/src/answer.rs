@@ -16,7 +16,10 @@ use crate::input::Observations;
 /// What the result contract has no place for: the disagreement of pose pairs per axis, metres and radians.
 type PairSigmas = Option<(f64, f64)>;
 
-/// The result document as JSON, and the disagreement of pose pairs.
+/// RMS distance \[m\] between reported poses and those of the arm, where these are not its poses: it is then not corrected.
+type OtherChain = Option<f64>;
+
+/// The result document as JSON, the disagreement of pose pairs, and whether the controller counts with another arm.
 #[pyfunction]
 #[pyo3(signature = (observations, method, keep_outliers, free_scale, goal_mm, progress))]
 pub fn calibrate(
@@ -27,19 +30,23 @@ pub fn calibrate(
     free_scale: bool,
     goal_mm: Option<f64>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> Result<(String, PairSigmas), Failure> {
+) -> Result<(String, PairSigmas, OtherChain), Failure> {
     let method = method_by_name(method)?;
     let options = Options { keep_outliers, free_scale };
     let observations = observations.get();
-    let (mut result, sigmas) = run(py, progress, |work| {
+    // A folder is calibrated without an arm that does not fit, as on the command line; who gives one with arrays means it.
+    if let (None, Some(Err(why))) = (&observations.folder, &observations.arm) {
+        return Err(why.clone().into());
+    }
+    let (mut result, sigmas, other_chain) = run(py, progress, |work| {
         let observed = &observations.observed;
         let wanted = FindingOptions::with_goal_mm(goal_mm);
         let calibration = calibrate_with(observed, method, options, &wanted, work)?;
-        let result = document(observations, &calibration, method, options);
-        Ok((result, calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad))))
+        let (result, other_chain) = document(observations, &calibration, method, options);
+        Ok((result, calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad)), other_chain))
     })?;
     result.provenance.input_sha256 = observations.folder.as_ref().map(|folder| folder.input_sha256(py)).transpose()?;
-    Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas))
+    Ok((result.to_json().map_err(|error| Failure::NoAnswer(error.to_string()))?, sigmas, other_chain))
 }
 
 /// What is wrong with the data: JSON, the page of text, and whether nothing is.
@@ -78,12 +85,16 @@ fn document(
     calibration: &Calibration,
     method: Method,
     options: Options,
-) -> CalibrationResult {
+) -> (CalibrationResult, OtherChain) {
     let mut reported = solve_options(method, options, &observations.observed.target);
     if !observations.target_is_known {
         reported.insert(TARGET_OPTION.to_owned(), Value::Null);
     }
     let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), None, reported);
     result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
-    result
+    let other_chain = observations.arm.as_ref().and_then(|arm| arm.as_ref().ok()).and_then(|arm| {
+        let is_its_own = result.state_arm(calibration, arm, &observations.observed.target);
+        (!is_its_own).then(|| arm.placement.rms_m())
+    });
+    (result, other_chain)
 }

@@ -2,6 +2,7 @@
 
 use handeye_estimate::CalibrateError;
 use handeye_estimate::handeye::HandEyeError;
+use handeye_estimate::placement::PlacementError;
 use pyo3::PyErr;
 
 /// The classes, which are Python's.
@@ -36,6 +37,15 @@ impl From<CalibrateError> for Failure {
         match error {
             CalibrateError::NothingObserved { .. } => Self::input(error),
             error => Self::NoAnswer(error.to_string()),
+        }
+    }
+}
+
+impl From<PlacementError> for Failure {
+    fn from(error: PlacementError) -> Self {
+        match error {
+            PlacementError::NotPlaced(_) => Self::NoAnswer(error.to_string()),
+            error => Self::input(error),
         }
     }
 }

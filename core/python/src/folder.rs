@@ -82,8 +82,9 @@ pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, Str
         "notes": dataset.outside,
     });
     let observed = dataset.observations(|_image| None);
+    let arm = dataset.arm_of_views();
     let folder = Some(Folder { dataset, listing });
-    Ok((Observations { observed, folder, target_is_known: true }, described.to_string(), arrays))
+    Ok((Observations { observed, folder, target_is_known: true, arm }, described.to_string(), arrays))
 }
 
 fn matrix(pose: Option<Vec<f64>>) -> Vec<f64> {

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use handeye_estimate::handeye::Mode;
+use handeye_estimate::placement::{ArmOfViews, PlacementError};
 use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Observations as Observed, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -13,6 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 
+use crate::arm_of_views::{ArmDescription, placed};
 use crate::error::Failure;
 use crate::folder::Folder;
 use crate::numbers::{bytes_of, doubles, integers, poses};
@@ -34,6 +36,7 @@ struct Description {
     start: Option<Lens>,
     model: Option<String>,
     names: Vec<String>,
+    arm: Option<ArmDescription>,
 }
 
 /// Intrinsics as Python has them.
@@ -85,6 +88,8 @@ pub struct Observations {
     pub folder: Option<Folder>,
     /// Whether the target was stated.
     pub target_is_known: bool,
+    /// The arm, where its joints in the views are known; why they are not used otherwise.
+    pub arm: Option<Result<ArmOfViews, PlacementError>>,
 }
 
 /// Corners of a view: their numbers, all of the target where they are left out, and pixels u, v.
@@ -92,15 +97,17 @@ type CornerArrays = (Option<Vec<u8>>, Vec<u8>);
 
 #[pymethods]
 impl Observations {
-    /// `description` is JSON; arrays are bytes, a 4 × 4 matrix for every view, numbers of corners as int64.
+    /// `description` is JSON; arrays are bytes, a 4 × 4 matrix for every view, numbers of corners as int64,
+    /// the joint values of every view.
     #[new]
     fn new(
         description: &str,
         base_from_tip: Option<&[u8]>,
         corners: Option<Vec<Option<CornerArrays>>>,
         camera_from_target: Option<&[u8]>,
+        joints: Option<&[u8]>,
     ) -> Result<Self, Failure> {
-        let Description { mode, target, image_size, known, start, model: lens_model, names } =
+        let Description { mode, target, image_size, known, start, model: lens_model, names, arm } =
             serde_json::from_str(description).map_err(Failure::input)?;
         if let Some(target) = &target {
             target.check().map_err(Failure::input)?;
@@ -138,9 +145,16 @@ impl Observations {
                 ..ObservedView::new(name, base_from_tip.as_ref().map(|poses| poses[index]), seen.transpose()?)
             });
         }
+        let arm = arm.zip(joints).map(|(arm, joints)| placed(arm, joints, &mut views)).transpose()?;
         let image_size = image_size.unwrap_or_default();
         let observed = Observed { mode, target: spec, image_size, camera, views };
-        Ok(Self { observed, folder: None, target_is_known: target.is_some() })
+        Ok(Self { observed, folder: None, target_is_known: target.is_some(), arm })
+    }
+
+    /// Why joint values that are there are not used; nothing where they are.
+    #[getter]
+    fn joints_unused(&self) -> Option<String> {
+        self.arm.as_ref()?.as_ref().err().map(ToString::to_string)
     }
 }
 

@@ -7,9 +7,11 @@
 #![expect(clippy::needless_pass_by_value, reason = "functions that Python calls own what they take")]
 
 mod answer;
+mod arm_of_views;
 mod background;
 mod clocks;
 mod closed_form;
+mod corrected;
 mod error;
 mod folder;
 mod input;
@@ -26,6 +28,8 @@ mod _handeye {
     use crate::clocks::{of_streams, poses_at};
     #[pymodule_export]
     use crate::closed_form::by_name;
+    #[pymodule_export]
+    use crate::corrected::{CorrectedArm, read_result};
     #[pymodule_export]
     use crate::folder::read_folder;
     #[pymodule_export]

@@ -9,7 +9,7 @@ use pyo3::types::PyBytes;
 use crate::error::Failure;
 
 /// Numbers of a 4 × 4 matrix.
-const OF_MATRIX: usize = 16;
+pub const OF_MATRIX: usize = 16;
 /// How far the last row of a transform may be from 0 0 0 1.
 const LAST_ROW: f64 = 1e-9;
 
@@ -56,7 +56,8 @@ pub fn poses<Dst: Frame, Src: Frame>(
     matrices.iter().zip(names).map(one).collect()
 }
 
-fn isometry(m: &[f64; OF_MATRIX]) -> Result<Isometry3<f64>, String> {
+/// The transform of a matrix; words where it is none.
+pub fn isometry(m: &[f64; OF_MATRIX]) -> Result<Isometry3<f64>, String> {
     if !m.iter().all(|v| v.is_finite()) {
         return Err("a number is not finite: leave this view out, or correct its pose".to_owned());
     }

@@ -136,7 +136,7 @@ fn shown_per_unit(error: LinkError) -> f64 {
 
 impl ArmEstimate {
     /// Of a fit of the errors of an arm; `None` where that is an arm with another number of joints.
-    pub fn new(chain: &Arm, fit: &ArmFit) -> Option<Self> {
+    pub fn new(chain: &Arm, fit: &ArmFit, tool_m: [f64; 3]) -> Option<Self> {
         if chain.joint_count() != fit.errors.joint_count() {
             return None;
         }
@@ -154,7 +154,7 @@ impl ArmEstimate {
         let row = |i: usize| (0..count).map(|j| fit.covariance[(12 + i, 12 + j)]).collect();
         Some(Self {
             chain: chain.clone(),
-            tool_m: usual_tool(),
+            tool_m,
             joints,
             levels: ArmLevels {
                 angle_deg: fit.noise.link_rad.to_degrees(),
@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn an_arm_comes_back_from_its_document_with_the_same_errors() {
         let (chain, fit) = golden_arm();
-        let estimate = ArmEstimate::new(&chain, &fit).expect("six joints");
+        let estimate = ArmEstimate::new(&chain, &fit, usual_tool()).expect("six joints");
         assert_eq!(
             estimate.joints[0],
             JointErrorEstimate { name: estimate.joints[0].name.clone(), ..Default::default() }
@@ -259,7 +259,7 @@ mod tests {
     #[test]
     fn a_document_of_another_arm_is_refused_by_name() {
         let (chain, fit) = golden_arm();
-        let whole = ArmEstimate::new(&chain, &fit).expect("six joints");
+        let whole = ArmEstimate::new(&chain, &fit, usual_tool()).expect("six joints");
         let mut other = whole.clone();
         other.joints.pop();
         assert_eq!(other.corrected_arm().expect_err("five").at, "arm.joints");

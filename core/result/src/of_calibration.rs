@@ -2,18 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, MethodRecord,
+    ArmEstimate, BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, MethodRecord,
     OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate,
     TargetSizeEstimate, ViewRecord, ViewRecordStatus,
 };
+use handeye_arm::Arm;
+use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::handeye::joint::{PoseDependentError, PrintErrors, ShownDistortion};
+use handeye_estimate::placement::ArmOfViews;
+use handeye_estimate::reach_error::{ReachErrors, Seen, reach_errors};
 use handeye_estimate::uncertainty::overdispersion::Evidence;
 use handeye_estimate::{
-    CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
+    ArmFit, CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
 };
 use handeye_geometry::targets::TargetSpec;
 
@@ -75,6 +79,42 @@ impl CalibrationResult {
         }
         result
     }
+
+    /// States what a calibration found of the errors of an arm, and how near a tool arrives with it; nothing where it found none.
+    /// `of_views` is the arm in its views, and `target` what they show.
+    ///
+    /// False where the reported poses are not those of the arm's chain, see [`handeye_estimate::placement::Placement::arm_of_poses`]: errors that are found beside
+    /// them are none of the arm, and nothing is stated.
+    #[must_use]
+    pub fn state_arm(&mut self, calibration: &Calibration, of_views: &ArmOfViews, target: &TargetSpec) -> bool {
+        let Some(errors) = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()) else { return true };
+        let ArmOfViews { placement, tool_m, joints_rad } = of_views;
+        let Some(arm) = placement.arm_of_poses() else { return false };
+        self.arm = ArmEstimate::new(arm, errors, *tool_m);
+        // What views left out contradict is not promised.
+        let tool = Vector3::from(*tool_m);
+        let reach = reach(calibration, arm, errors, joints_rad, (target, &tool)).filter(|_| !errors.contradicted);
+        self.quality.reach_error_95_mm = reach.map(|reach| reach.as_it_is_95_m * 1e3);
+        self.quality.reach_error_corrected_95_mm = reach.map(|reach| reach.corrected_95_m * 1e3);
+        true
+    }
+}
+
+/// How near a tool arrives; `None` where the error of the calibration cannot be stated either.
+fn reach(
+    calibration: &Calibration,
+    arm: &Arm,
+    errors: &ArmFit,
+    joints_rad: &[Option<Vec<f64>>],
+    (target, tool): (&TargetSpec, &Vector3<f64>),
+) -> Option<ReachErrors> {
+    calibration.tip_error_95_m()?;
+    let arm = CorrectedArm::new(arm.clone(), errors)?;
+    let seen = calibration.views.iter().zip(joints_rad).filter_map(|(view, joints_rad)| {
+        let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
+        Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })
+    });
+    reach_errors(&arm, errors, &calibration.hand_eye?, &seen.collect::<Vec<_>>(), target, tool)
 }
 
 fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {

@@ -60,7 +60,7 @@ pub fn golden() -> CalibrationResult {
         })
         .collect();
     let (chain, arm) = golden_arm();
-    result.arm = super::ArmEstimate::new(&chain, &arm);
+    result.arm = super::ArmEstimate::new(&chain, &arm, [0.0, 0.0, 0.1]);
     result.estimate = Some(EstimateDetails {
         modelled_error_95_mm: Some(0.2),
         moved_mm: Some(1.5),

@@ -77,7 +77,7 @@ pub use edit_error::{EditError, TaughtChange};
 pub use error::{SessionError, SessionProblem};
 pub use history::{History, UNDO_STEPS};
 pub use lock::FolderLock;
-pub use observations::{ArmOfViews, SessionObservations};
+pub use observations::SessionObservations;
 pub use session_file::{FORMAT, MAJOR_VERSION, MINOR_VERSION};
 pub use store::Store;
 

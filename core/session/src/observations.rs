@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::capture_id::CaptureId;
 use super::document::{Document, Role};
 use handeye_dataset::CameraInput;
-use handeye_estimate::placement::{Placement, PlacementError};
+use handeye_estimate::placement::{ArmOfViews, Placement, PlacementError};
 use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::{Observations, ObservedView};
 use handeye_geometry::targets::observation::{Sight, View};
@@ -22,17 +22,6 @@ pub struct SessionObservations {
     pub verification: Vec<(CaptureId, View)>,
     /// The arm, where the joint angles of the captures are used.
     pub arm: Option<ArmOfViews>,
-}
-
-/// An arm and its joints in the views.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ArmOfViews {
-    /// Where the views put it, and how far from them.
-    pub placement: Placement,
-    /// Where the tip of its tool is in the frame of the tip, metres.
-    pub tool_m: [f64; 3],
-    /// Its joint values in each view, radians; `None` where a view has none.
-    pub joints_rad: Vec<Option<Vec<f64>>>,
 }
 
 impl Document {

@@ -4,20 +4,17 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use handeye_arm::Arm;
-use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_estimate::diagnose::{Calibration, examine};
 use handeye_estimate::handeye::HandEyeError;
-use handeye_estimate::reach_error::{ReachErrors, Seen, reach_errors};
+use handeye_estimate::placement::ArmOfViews;
 use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
-use handeye_estimate::{self as estimate, ArmFit, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
+use handeye_estimate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
 use handeye_geometry::progress::{CancelToken, Progress, Work};
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::targets::observation::View;
 use handeye_result::{ArmEstimate, CalibrationResult, DepthSummary, VerificationSummary, solve_options};
-use handeye_session::{ArmOfViews, CaptureId};
-use nalgebra::Vector3;
+use handeye_session::CaptureId;
 
 use crate::model::{JobId, Solved, Truth};
 use crate::solve;
@@ -98,22 +95,14 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
     let mut findings = calibration.diagnosis().findings.clone();
     let options = solve_options(job.method, job.options, &job.observations.target);
     let mut result = CalibrationResult::of(&calibration, env!("CARGO_PKG_VERSION"), None, options);
-    if let Some((of_views, errors)) =
-        job.arm.as_ref().zip(calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()))
+    if let Some(of_views) = &job.arm
+        && !result.state_arm(&calibration, of_views, &job.observations.target)
     {
-        if let Some(arm) = of_views.placement.arm_of_poses() {
-            result.arm = ArmEstimate::new(arm, errors).map(|arm| ArmEstimate { tool_m: of_views.tool_m, ..arm });
-            // What views left out contradict is not promised.
-            let reach = reach(job, &calibration, arm, (of_views, errors)).filter(|_| !errors.contradicted);
-            result.quality.reach_error_95_mm = reach.map(|reach| reach.as_it_is_95_m * 1e3);
-            result.quality.reach_error_corrected_95_mm = reach.map(|reach| reach.corrected_95_m * 1e3);
-        } else {
-            tracing::warn!(
-                "the reported poses are {:.3} mm RMS from those of the arm by its joint angles: the controller counts with another \
-                 chain, such as its factory calibration, and no commands are corrected",
-                of_views.placement.rms_m() * 1e3
-            );
-        }
+        tracing::warn!(
+            "the reported poses are {:.3} mm RMS from those of the arm by its joint angles: the controller counts with another \
+             chain, such as its factory calibration, and no commands are corrected",
+            of_views.placement.rms_m() * 1e3
+        );
     }
     if let Some(truth) = &job.truth {
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
@@ -147,23 +136,6 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
         calibration,
         took_s: 0.0,
     })
-}
-
-/// How near a tool arrives; `None` where the error of the calibration cannot be stated either.
-fn reach(
-    job: &SolveJob,
-    calibration: &Calibration,
-    arm: &Arm,
-    (of_views, errors): (&ArmOfViews, &ArmFit),
-) -> Option<ReachErrors> {
-    calibration.tip_error_95_m()?;
-    let arm = CorrectedArm::new(arm.clone(), errors)?;
-    let seen = calibration.views.iter().zip(&of_views.joints_rad).filter_map(|(view, joints_rad)| {
-        let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
-        Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })
-    });
-    let tool = Vector3::from(of_views.tool_m);
-    reach_errors(&arm, errors, &calibration.hand_eye?, &seen.collect::<Vec<_>>(), &job.observations.target, &tool)
 }
 
 /// What the depths of the captures in the fit say of a depth camera.

@@ -34,6 +34,14 @@ def poses(what: str, value: Any) -> Array:
     return array
 
 
+def joints_of_views(value: Any) -> Array:
+    """Joint values of every view, (N, n)."""
+    array = floats("joints", value)
+    if array.ndim != 2:
+        raise InputError(f"joints have shape {array.shape}, and are (N, n): the values of n joints for each view, radians")
+    return array
+
+
 def packed(array: Array) -> bytes:
     """Its bytes as the compiled part takes them."""
     return np.ascontiguousarray(array).tobytes()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import warnings
 from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
 from . import _handeye
-from ._arrays import corners_of_views, packed, poses
+from ._arm import described as described_arm
+from ._arrays import corners_of_views, joints_of_views, packed, poses
 from ._dataset import Dataset
-from ._errors import InputError
+from ._errors import CalibrationWarning, InputError
 from ._result import Calibration, Diagnosis
 from ._types import Intrinsics, Target
 
@@ -30,6 +32,8 @@ def calibrate(
     lens_model: Optional[str] = None,
     mode: Optional[str] = None,
     names: Optional[Sequence[str]] = None,
+    joints: Any = None,
+    arm: Any = None,
     method: str = "joint",
     keep_outliers: bool = False,
     free_scale: bool = False,
@@ -45,7 +49,7 @@ def calibrate(
     Parameters
     ----------
     dataset
-        A data set; everything up to `names` is then left out.
+        A data set; everything up to `arm` is then left out.
     corners
         For each of N views (M, 2) pixels u, v, or None where the target was not found. (0, 0) is the centre of the top-left
         pixel, as OpenCV has it; (M, 1, 2), which OpenCV's detectors answer, is taken too.
@@ -71,6 +75,13 @@ def calibrate(
         on the tip). Needed with `base_from_tip`: it is never guessed.
     names
         Of the views, for messages; "view 0", "view 1" … when left out.
+    joints
+        (N, n) joint values of the arm for each view, as the controller reports them, radians. With `arm` the errors of the arm
+        are estimated too: `Calibration.arm`, `Calibration.correct`.
+    arm
+        Which arm it is: the name of one that is built in, such as "ur5e"; rows of Denavit and Hartenberg (n, 4) of a, alpha, d,
+        theta, metres and radians; or the path of a URDF file, where that leaves a choice as (path, base link, tip link). Where
+        it stands and what its tool is follow from the poses.
     method
         joint, or one closed form: tsai_lenz, park_martin, horaud, andreff, daniilidis, shah, li.
     keep_outliers
@@ -91,17 +102,31 @@ def calibrate(
     Raises
     ------
     InputError
-        A shape, a number or a combination that cannot be used.
+        A shape, a number or a combination that cannot be used; joint values that do not belong to the poses.
     CalibrationError
         Too few views (three at least), a robot that did not turn or turned about one axis only.
+
+    Warns
+    -----
+    CalibrationWarning
+        The arm of a data set is not used, or the controller counts with another chain than the arm's.
     """
     observations = _observations(
         dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics, intrinsics_start,
-        lens_model, mode, names,
+        lens_model, mode, names, joints, arm,
     )
-    return Calibration._of(
-        *_handeye.calibrate(observations, method, keep_outliers, free_scale, goal_mm, progress)
+    if dataset is not None:
+        _warn_of_unused(observations.joints_unused)
+    document, sigmas, other_chain_m = _handeye.calibrate(
+        observations, method, keep_outliers, free_scale, goal_mm, progress
     )
+    if other_chain_m is not None:
+        message = (
+            f"the reported poses are {1e3 * other_chain_m:.3f} mm RMS from those of the arm by its joint values: the controller "
+            "counts with another chain, such as its factory calibration, and the errors of the arm are not stated"
+        )
+        warnings.warn(message, CalibrationWarning, stacklevel=2)
+    return Calibration._of(document, sigmas)
 
 
 def doctor(
@@ -118,6 +143,8 @@ def doctor(
     lens_model: Optional[str] = None,
     mode: Optional[str] = None,
     names: Optional[Sequence[str]] = None,
+    joints: Any = None,
+    arm: Any = None,
     goal_mm: Optional[float] = None,
     progress: Optional[Progress] = None,
 ) -> Diagnosis:
@@ -135,12 +162,23 @@ def doctor(
     ------
     InputError
         A shape, a number or a combination that cannot be used.
+
+    Warns
+    -----
+    CalibrationWarning
+        Joint values are not used, because they do not belong to the poses: which of the two is wrong is what it looks for.
     """
     observations = _observations(
         dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics, intrinsics_start,
-        lens_model, mode, names,
+        lens_model, mode, names, joints, arm,
     )
+    _warn_of_unused(observations.joints_unused)
     return Diagnosis._of(*_handeye.diagnose(observations, goal_mm, progress))
+
+
+def _warn_of_unused(why: Optional[str]) -> None:
+    if why is not None:
+        warnings.warn(f"joint values are not used: {why}", CalibrationWarning, stacklevel=3)
 
 
 def _observations(
@@ -156,12 +194,15 @@ def _observations(
     lens_model: Optional[str],
     mode: Optional[str],
     names: Optional[Sequence[str]],
+    joints: Any,
+    arm: Any,
 ) -> Any:
     if dataset is not None:
         rest = {
             "corners": corners, "corner_ids": corner_ids, "target": target, "base_from_tip": base_from_tip,
             "camera_from_target": camera_from_target, "image_size": image_size, "intrinsics": intrinsics,
             "intrinsics_start": intrinsics_start, "lens_model": lens_model, "mode": mode, "names": names,
+            "joints": joints, "arm": arm,
         }
         given = [name for name, value in rest.items() if value is not None]
         if not isinstance(dataset, Dataset):
@@ -187,6 +228,13 @@ def _observations(
         raise InputError("image_size is missing: (width, height) in pixels")
     if intrinsics is not None and (intrinsics_start is not None or lens_model is not None):
         raise InputError("intrinsics are known and not estimated: leave intrinsics_start and lens_model out")
+    if (joints is None) != (arm is None):
+        given, missing = ("joints", "arm") if arm is None else ("arm", "joints")
+        raise InputError(
+            f"{given} without {missing}: the errors of an arm need its joint values and which arm it is; give both or neither"
+        )
+    if joints is not None and base_from_tip is None:
+        raise InputError("base_from_tip is missing: joints belong to poses of the tip")
     for what, lens in (("intrinsics", intrinsics), ("intrinsics_start", intrinsics_start)):
         if lens is None:
             continue
@@ -199,11 +247,9 @@ def _observations(
     robot = None if base_from_tip is None else poses("base_from_tip", base_from_tip)
     seen = None if camera_from_target is None else poses("camera_from_target", camera_from_target)
     found = None if corners is None else corners_of_views(corners, corner_ids)
-    counts = {
-        what: len(values)
-        for what, values in (("base_from_tip", robot), ("camera_from_target", seen), ("corners", found), ("names", names))
-        if values is not None
-    }
+    turned = None if joints is None else joints_of_views(joints)
+    of_views = {"base_from_tip": robot, "camera_from_target": seen, "corners": found, "joints": turned, "names": names}
+    counts = {what: len(values) for what, values in of_views.items() if values is not None}
     if len(set(counts.values())) > 1:
         said = ", ".join(f"{count} in {what}" for what, count in counts.items())
         raise InputError(f"views do not match: {said}; one for each view is needed, in the same order")
@@ -217,7 +263,9 @@ def _observations(
         "start": None if intrinsics_start is None else intrinsics_start._document(),
         "model": lens_model,
         "names": [str(n) for n in names] if names is not None else [f"view {i}" for i in range(max(counts.values()))],
+        "arm": None if arm is None else described_arm(arm),
     }
     return _handeye.Observations(
-        json.dumps(described), None if robot is None else packed(robot), found, None if seen is None else packed(seen)
+        json.dumps(described), None if robot is None else packed(robot), found, None if seen is None else packed(seen),
+        None if turned is None else packed(turned),
     )

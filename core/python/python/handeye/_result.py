@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
+from . import _handeye
+from ._arm import Arm, Command, TipPose, actual, correct
 from ._arrays import Array, covariance, transform
 from ._types import Finding, Intrinsics, findings_of
 
@@ -79,6 +82,9 @@ class Calibration:
     """One for each view, in the order given."""
     findings: List[Finding]
     """What is weak or wrong, the most severe first."""
+    arm: Optional[Arm]
+    """The errors of the robot's arm, and the transforms that go with corrected poses; None where its joints are not known, for pose
+    pairs and for a closed form."""
     methods: Dict[str, Optional[Array]]
     """What the closed forms say, by name: the hand-eye transform (4, 4), None where one failed."""
     document: Mapping[str, Any] = field(repr=False)
@@ -94,6 +100,45 @@ class Calibration:
     def problem(self) -> Optional[Finding]:
         """The first finding because of which the answer is not to be used; None when there is none."""
         return next((finding for finding in self.findings if finding.severity == "problem"), None)
+
+    def correct(self, pose: Any, near: Any = None) -> Command:
+        """What to command so that the tip really is at `pose`, by the errors of the arm. Moves nothing.
+
+        Parameters
+        ----------
+        pose
+            base_from_tip that is wanted, (4, 4) or (N, 4, 4), metres. A pose that the camera gave comes from `arm.hand_eye` and
+            `actual`, not from `hand_eye` and reported poses.
+        near
+            Joint values near which the arm shall be, (n,) or (N, n), radians: of several ways to reach a pose the nearest is taken.
+            Where a pose has none, those of the pose before; the search for the first begins in the middle of the ranges.
+
+        Raises
+        ------
+        InputError
+            The calibration knows no errors of an arm; a shape; a pose that the arm does not reach, with its row.
+
+        Warns
+        -----
+        CalibrationWarning
+            Where `arm.contradicted`.
+        """
+        return correct(self.document, pose, near)
+
+    def actual(self, joints: Any) -> TipPose:
+        """Where the tip really is when the controller reports `joints`, (n,) or (N, n) radians.
+
+        Raises
+        ------
+        InputError
+            The calibration knows no errors of an arm; a shape; a value that is not finite, with its row.
+
+        Warns
+        -----
+        CalibrationWarning
+            Where `arm.contradicted`.
+        """
+        return actual(self.document, joints)
 
     def to_json(self) -> str:
         """The result document that `handeye calibrate --json` writes, which `handeye export` and `handeye track` read."""
@@ -136,10 +181,26 @@ class Calibration:
                 for view in document["views"]
             ],
             findings=findings_of(document["findings"]),
+            arm=Arm._of(document),
             methods={m["name"]: transform(m) if m["status"] == "ok" else None for m in document["methods"]},
             document=document,
             _json=text,
         )
+
+
+def load_calibration(path: Union[str, "os.PathLike[str]"]) -> Calibration:
+    """Reads a result: a file of `Calibration.to_json` or `handeye calibrate --json`, or a session or dataset folder with a
+    result.json. The disagreement of pose pairs is not in it, and None.
+
+    Raises
+    ------
+    InputError
+        No file, or another than a result, with its name.
+    """
+    file = os.fspath(path)
+    if os.path.isdir(file):
+        file = os.path.join(file, "result.json")
+    return Calibration._of(_handeye.read_result(file), None)
 
 
 @dataclass(frozen=True)

@@ -198,6 +198,12 @@ impl ArmErrors {
             .fold(Isometry3::identity(), |tip, (error, tip_from_joint)| tip * moved_by(error, tip_from_joint))
     }
 
+    /// What each joint is displaced by in its frame at rest, without what gravity does.
+    pub(crate) fn at_rest(&self) -> Vec<Isometry3<f64>> {
+        let weightless = vec![0.0; self.joints];
+        self.of_joints(&arm_parameters(self.joints), &weightless).iter().map(correction_transform).collect()
+    }
+
     /// The error of every joint in its frame at rest, as a correction.
     fn of_joints(&self, parameters: &[ArmParameter], torques: &[f64]) -> Vec<Vector6<f64>> {
         let mut errors = vec![Vector6::zeros(); self.joints];
