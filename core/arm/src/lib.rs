@@ -157,6 +157,22 @@ impl Arm {
         Ok(self)
     }
 
+    /// The same arm with joints that sit elsewhere, from the base to the tip: each is moved by a transform in its own frame at
+    /// rest, and what is behind it with it.
+    ///
+    /// # Errors
+    /// [`ArmError::WrongCount`], and [`ArmError::BadJoint`] for a transform that no arm has.
+    pub fn displaced(&self, joint_from_displaced: &[Isometry3<f64>]) -> Result<Self, ArmError> {
+        if joint_from_displaced.len() != self.joints.len() {
+            return Err(ArmError::WrongCount { got: joint_from_displaced.len(), need: self.joints.len() });
+        }
+        let mut joints = self.joints.clone();
+        for (joint, displacement) in joints.iter_mut().zip(joint_from_displaced) {
+            joint.previous_from_joint *= displacement;
+        }
+        Ok(Self::new(joints, self.last_from_flange)?.mounted(self.base_from_first, self.flange_from_tip))
+    }
+
     /// The ranges of all joints, from the base to the tip.
     pub fn ranges(&self) -> Vec<JointRange> {
         self.joints.iter().map(|joint| joint.range).collect()
