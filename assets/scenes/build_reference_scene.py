@@ -62,6 +62,7 @@ ONLY = {
     "robot.repeatability_mm": 0.0,
     "robot.repeatability_deg": 0.0,
     "robot.joint_offset_deg": JOINTS * [0.0],
+    "robot.arm_errors": {"angle_deg": 0.0, "length_mm": 0.0, "compliance_deg": 0.0},
     "camera.fx": None,
     "camera.fy": None,
     "camera.cx": None,

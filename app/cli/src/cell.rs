@@ -7,7 +7,7 @@ use handeye_cell::scene::{BoardPath, Scene, SceneChoice};
 use handeye_server::{CellConfig, CellServer};
 
 use crate::{Failure, out, solve};
-use handeye_workbench::arguments::heading;
+use handeye_workbench::arguments::{ArmErrorsChoice, heading};
 
 /// Options of `handeye cell`.
 #[derive(Debug, Args)]
@@ -61,24 +61,30 @@ impl CellArgs {
     }
 }
 
-/// The option `--scene`.
+/// The options `--scene` and `--arm-errors`.
 #[derive(Debug, Args)]
 pub struct SceneArg {
-    /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, coppeliasim, tracking, panda, xarm6; the
-    /// reference scene if not given.
+    /// Scene file (TOML), or the name of one that comes with the program: reference, realistic, nominal, coppeliasim, tracking,
+    /// panda, xarm6; the reference scene if not given.
     #[arg(long, value_name = "FILE|NAME", help_heading = heading::CELL)]
     scene: Option<SceneChoice>,
+    /// How far the links of the arm are off those that its controller counts with; as the scene says if not given.
+    #[arg(long, value_name = "LEVEL", value_enum, help_heading = heading::CELL)]
+    arm_errors: Option<ArmErrorsChoice>,
 }
 
 impl SceneArg {
-    /// Reads the scene.
+    /// Reads the scene, with the errors of the arm that were asked for.
     pub fn load(&self) -> Result<Scene, Failure> {
-        self.scene.clone().unwrap_or_default().load().map_err(Failure::unusable)
+        let mut scene = self.scene.clone().unwrap_or_default().load().map_err(Failure::unusable)?;
+        scene.robot.arm_errors = self.arm_errors.map_or(scene.robot.arm_errors, ArmErrorsChoice::levels);
+        Ok(scene)
     }
 
-    /// Whether one was named.
-    pub fn is_given(&self) -> bool {
-        self.scene.is_some()
+    /// Which of the options was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let given = [("--scene", self.scene.is_some()), ("--arm-errors", self.arm_errors.is_some())];
+        given.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
     }
 }
 

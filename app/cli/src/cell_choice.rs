@@ -61,9 +61,11 @@ impl CellChoice {
     /// # Errors
     /// When it cannot be read, and when it goes with another cell.
     pub fn scene(&self) -> Result<Scene, Failure> {
-        if self.is_given() && self.scene.is_given() {
+        if self.is_given()
+            && let Some(option) = self.scene.given()
+        {
             return Err(Failure::unusable(anyhow::anyhow!(
-                "--scene describes the built-in cell and --connect or --driver takes another: give one of them"
+                "{option} describes the built-in cell and --connect or --driver takes another: give one of them"
             )));
         }
         self.scene.load()
@@ -96,5 +98,48 @@ impl CellChoice {
     pub fn speed(&self) -> f64 {
         let usual = if self.driver.is_some() { REAL_SPEED } else { 1.0 };
         self.speed.map_or(usual, |percent| percent / 100.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use handeye_cell::scene::ArmErrorsSpec;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        choice: CellChoice,
+    }
+
+    fn scene(words: &[&str]) -> Result<Scene, Failure> {
+        let line = Line::try_parse_from(std::iter::once("handeye").chain(words.iter().copied()));
+        line.unwrap_or_else(|error| panic!("{error}")).choice.scene()
+    }
+
+    #[test]
+    fn the_arm_has_the_errors_that_are_asked_for_and_else_those_of_its_scene() {
+        for (words, expected) in [
+            (&[][..], ArmErrorsSpec::NONE),
+            (&["--arm-errors", "nominal"], ArmErrorsSpec::NOMINAL),
+            (&["--scene", "panda", "--arm-errors", "nominal"], ArmErrorsSpec::NOMINAL),
+            (&["--scene", "nominal"], ArmErrorsSpec::NOMINAL),
+            (&["--scene", "nominal", "--arm-errors", "none"], ArmErrorsSpec::NONE),
+        ] {
+            let scene = scene(words).unwrap_or_else(|failure| panic!("{words:?}: {failure}"));
+            assert_eq!(scene.robot.arm_errors, expected, "{words:?}");
+        }
+    }
+
+    #[test]
+    fn what_describes_the_built_in_cell_is_refused_with_another() {
+        for other in [["--connect", "tcp://127.0.0.1:23000"], ["--driver", "python3 mine.py"]] {
+            for own in [["--scene", "panda"], ["--arm-errors", "none"]] {
+                let failure = scene(&[other, own].concat()).expect_err(own[0]);
+                assert!(failure.to_string().contains(own[0]), "{failure}");
+            }
+        }
     }
 }

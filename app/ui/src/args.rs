@@ -3,7 +3,7 @@
 use clap::Args;
 use handeye_cell::scene::SceneChoice;
 
-use handeye_workbench::arguments::{ObjectArgs, heading};
+use handeye_workbench::arguments::{ArmErrorsChoice, ObjectArgs, heading};
 
 /// Options of the workbench.
 #[derive(Debug, Args, Default)]
@@ -11,9 +11,14 @@ pub struct GuiArgs {
     /// Address of a CoppeliaSim or cell; without it the built-in cell is started.
     #[arg(long, value_name = "ADDR", help_heading = heading::CELL)]
     pub connect: Option<String>,
-    /// Scene of the built-in cell: reference, realistic, coppeliasim, tracking, panda, xarm6, or a scene file; as in the settings if not given.
+    /// Scene of the built-in cell: reference, realistic, nominal, coppeliasim, tracking, panda, xarm6, or a scene file; as in the
+    /// settings if not given.
     #[arg(long, value_name = "FILE|NAME", conflicts_with_all = ["connect", "driver", "camera_driver"], help_heading = heading::CELL)]
     pub scene: Option<SceneChoice>,
+    /// How far the links of the built-in cell's arm are off those that its controller counts with; as the scene says if not
+    /// given.
+    #[arg(long, value_name = "LEVEL", value_enum, conflicts_with_all = ["connect", "driver", "camera_driver"], help_heading = heading::CELL)]
+    pub arm_errors: Option<ArmErrorsChoice>,
     /// Driver of the robot, or of robot and camera: a command, or tcp://HOST:PORT.
     #[arg(long, value_name = "DRIVER", conflicts_with = "connect", help_heading = heading::CELL)]
     pub driver: Option<String>,
@@ -30,4 +35,28 @@ pub struct GuiArgs {
     /// Session folder to open, or to create.
     #[arg(long, value_name = "DIR", help_heading = heading::OUTPUT)]
     pub session: Option<std::path::PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        gui: GuiArgs,
+    }
+
+    #[test]
+    fn what_describes_the_built_in_cell_is_refused_with_another() {
+        for own in [["--scene", "panda"], ["--arm-errors", "nominal"]] {
+            let parsed = |other: &[&str]| Line::try_parse_from(["handeye"].iter().chain(&own).chain(other));
+            assert!(parsed(&[]).is_ok(), "{own:?}");
+            for other in [["--connect", "127.0.0.1"], ["--driver", "mine"], ["--camera-driver", "mine"]] {
+                assert!(parsed(&other).is_err(), "{own:?} {other:?}");
+            }
+        }
+    }
 }

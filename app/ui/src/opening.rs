@@ -11,6 +11,7 @@ use super::waker::waker_of;
 use super::window::{Remembered, Window};
 use super::{GuiArgs, widget_list};
 use handeye_workbench::app::{App, Connect, InBrowser, Start};
+use handeye_workbench::arguments::ArmErrorsChoice;
 use handeye_workbench::model::{CellSource, Drivers};
 use handeye_workbench::settings::{self, Settings, SettingsFile, Warning};
 use handeye_workbench::worker::Clock;
@@ -45,6 +46,7 @@ impl Opening {
             (Some(address), _) => CellSource::Address(address.clone()),
             (None, Some(scene)) => CellSource::BuiltIn(scene.clone()),
             (None, None) if drivers != Drivers::default() => CellSource::Drivers(drivers),
+            (None, None) if args.arm_errors.is_some() => settings.built_in(),
             (None, None) => settings.source(),
         };
         if let Some(scene) = &args.scene {
@@ -93,7 +95,8 @@ impl Opening {
         let waker = waker_of(ctx)?;
         let started = Instant::now();
         let clock: Clock = Arc::new(move || started.elapsed().as_secs_f64());
-        let connect: Connect = Arc::new(CellSource::cell);
+        let arm_errors = args.arm_errors.map(ArmErrorsChoice::levels);
+        let connect: Connect = Arc::new(move |source, objects| source.cell_with(objects, arm_errors));
         let start = Start {
             source,
             view: remembered.view(settings.view()),

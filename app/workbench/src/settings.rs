@@ -156,11 +156,12 @@ impl Settings {
 
     /// The cell to work with at the start.
     pub fn source(&self) -> CellSource {
-        if self.connect.is_empty() {
-            CellSource::BuiltIn(self.scene.clone().into())
-        } else {
-            CellSource::Address(self.connect.clone())
-        }
+        if self.connect.is_empty() { self.built_in() } else { CellSource::Address(self.connect.clone()) }
+    }
+
+    /// The built-in cell.
+    pub fn built_in(&self) -> CellSource {
+        CellSource::BuiltIn(self.scene.clone().into())
     }
 
     /// Where new sessions go.

@@ -49,6 +49,26 @@ fn the_ur5_of_the_manufacturer_is_where_its_table_puts_it() {
 }
 
 #[test]
+fn a_joint_that_sits_elsewhere_takes_along_what_is_behind_it() {
+    let arm = mounted();
+    let off = se3::exp(&Vector6::new(0.01, -0.02, 0.03, 0.1, 0.2, -0.3));
+    for q in configurations(5) {
+        let (frames, tip) = (arm.frames(&q).expect("six joints"), arm.forward(&q).expect("six joints"));
+        for joint in 0..6 {
+            let displacements: Vec<_> = (0..6).map(|j| if j == joint { off } else { Isometry3::identity() }).collect();
+            let displaced = arm.displaced(&displacements).expect("six joints").forward(&q).expect("six joints");
+            let base_from_joint = frames.base_from_joint[joint] * arm.joints()[joint].joint_from_axis();
+            let expected = base_from_joint * off * base_from_joint.inverse() * tip.isometry();
+            assert!((expected.to_homogeneous() - displaced.isometry().to_homogeneous()).amax() < 1e-14, "{joint}");
+        }
+    }
+    assert_eq!(arm.displaced(&[Isometry3::identity(); 6]), Ok(arm.clone()));
+    assert_eq!(arm.displaced(&[off; 5]), Err(ArmError::WrongCount { got: 5, need: 6 }));
+    let far = Isometry3::translation(0.0, f64::NAN, 0.0);
+    assert!(matches!(arm.displaced(&[far; 6]), Err(ArmError::BadJoint { joint: 1, .. })));
+}
+
+#[test]
 fn twists_are_the_central_differences_of_the_forward_kinematics() {
     // The error of a central difference is h²/6 times a third derivative of order one, and rounding over h.
     const STEP: f64 = 1e-5;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use handeye_cell::scene::SceneChoice;
+use handeye_cell::scene::{ArmErrorsSpec, SceneChoice};
 use handeye_coppeliasim::cell::CellPaths;
 use serde::{Deserialize, Serialize};
 
@@ -23,10 +23,15 @@ pub enum CellSource {
 impl CellSource {
     /// The cell; `objects` is where another scene than the built-in one has its parts. Nothing is started or connected to yet.
     pub fn cell(&self, objects: &CellPaths) -> Arc<dyn Cell> {
+        self.cell_with(objects, None)
+    }
+
+    /// The same; the built-in one has these errors of the arm in place of those of its scene.
+    pub fn cell_with(&self, objects: &CellPaths, arm_errors: Option<ArmErrorsSpec>) -> Arc<dyn Cell> {
         match self {
             Self::Drivers(drivers) => Arc::new(DrivenCell::new(drivers.clone())),
             Self::Address(address) => Arc::new(RemoteCell::at(address.clone(), objects.clone())),
-            Self::BuiltIn(scene) => Arc::new(RemoteCell::built_in(scene.clone())),
+            Self::BuiltIn(scene) => Arc::new(RemoteCell::built_in(scene.clone(), arm_errors)),
         }
     }
 

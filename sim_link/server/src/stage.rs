@@ -1,13 +1,13 @@
 //! The objects of the built-in cell: arm, tip, camera, board and what stands around, as a scene describes them.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use handeye_arm::{Arm, JointValues};
 use handeye_cell::props;
 use handeye_cell::render::{Finish, Shape, Solid};
-use handeye_cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, RobotErrors, Scene, SlipSpec};
+use handeye_cell::scene::{JointModeSpec, RelativeTo, ResolvedScene, Scene, SlipSpec};
 use handeye_cell::world::{
-    Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError, turn_z,
+    Carrier, Chain, Faults, Handle, Joint, JointMode, Kind, Tree, VisionSensor, World, WorldError,
 };
 use handeye_motion::Course;
 
@@ -60,7 +60,7 @@ pub fn build(scene: &Scene, resolved: &ResolvedScene) -> Result<(World, Stage), 
     builder.surroundings(scene, resolved, plane)?;
     let mut world = World::default();
     world.tree = builder.tree;
-    world.set_faults(Box::new(CellFaults::new(joints.clone(), tip, resolved.robot_errors, plane, resolved.board_slip)));
+    world.set_faults(Box::new(CellFaults::new(joints.clone(), tip, plane, resolved.clone())));
     world.set_robot(joints.clone(), tip);
     world.carrier = Some(Carrier::new(plane, Course::new(&resolved.board_motion, resolved.seed)));
     world.set_time_step(resolved.simulation.time_step_s)?;
@@ -94,7 +94,7 @@ impl Builder {
                 JointModeSpec::Kinematic => JointMode::Kinematic,
                 JointModeSpec::Dynamic => JointMode::Dynamic,
             };
-            let axis_from_z = z_along(&part.axis);
+            let axis_from_z = part.joint_from_axis();
             let parent_from_joint = arm_from_parent.inv_mul(&(at_zero.base_from_joint[index] * axis_from_z));
             let handle = self.tree.add("joint", Kind::Joint(Box::new(joint)), Some(parent), parent_from_joint)?;
             joints.push(handle);
@@ -150,13 +150,6 @@ fn finish(alias: &str) -> Finish {
     }
 }
 
-/// The turn that takes z to an axis.
-fn z_along(axis: &UnitVector3<f64>) -> UnitQuaternion<f64> {
-    // Opposite to z any axis across will do for the half turn.
-    UnitQuaternion::rotation_between(&Vector3::z(), axis)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
-}
-
 /// `mounting plate` → `MountingPlate`: a name that can stand in a path.
 fn alias(name: &str) -> String {
     name.split(|c: char| !c.is_alphanumeric())
@@ -167,14 +160,14 @@ fn alias(name: &str) -> String {
         .collect()
 }
 
-/// The faults of a cell as the tree takes them: of the arm constant joint offsets, and a displacement of the tip that is
-/// another one every time the arm has come to rest; of the board that it slips.
+/// The faults of a cell as the tree takes them: of the arm joints that are elsewhere, and a displacement of the tip
+/// that is another one every time the arm has come to rest; of the board that it slips.
 #[derive(Debug)]
 struct CellFaults {
     joints: Vec<Handle>,
     tip: Handle,
-    errors: RobotErrors,
     plane: Handle,
+    scene: ResolvedScene,
     /// `None` when it has happened.
     slip: Option<SlipSpec>,
     reported: Option<JointValues>,
@@ -183,8 +176,9 @@ struct CellFaults {
 }
 
 impl CellFaults {
-    fn new(joints: Vec<Handle>, tip: Handle, errors: RobotErrors, plane: Handle, slip: Option<SlipSpec>) -> Self {
-        Self { joints, tip, errors, plane, slip, reported: None, moving: false, settled: 0 }
+    fn new(joints: Vec<Handle>, tip: Handle, plane: Handle, scene: ResolvedScene) -> Self {
+        let slip = scene.board_slip;
+        Self { joints, tip, plane, scene, slip, reported: None, moving: false, settled: 0 }
     }
 
     /// Moves the board as if somebody had put it there: what is forgotten at the end of the simulation goes back.
@@ -210,14 +204,15 @@ impl Faults for CellFaults {
         }
         self.moving = moved;
         self.reported = Some(reported);
-        for (joint, offset_rad) in self.joints.iter().zip(self.errors.joint_offset_rad.iter()) {
+        // There are none for values that are not numbers, and then there is no place either.
+        let displacements = self.scene.joint_displacements(&reported).unwrap_or_default();
+        for (joint, displacement) in self.joints.iter().zip(displacements) {
             if let Ok(object) = tree.get_mut(*joint) {
-                // Of a prismatic joint it is zero, which a scene is checked for.
-                object.displacement = turn_z(*offset_rad);
+                object.displacement = displacement;
             }
         }
         if let Ok(tip) = tree.get_mut(self.tip) {
-            tip.displacement = handeye_geometry::se3::exp(&self.errors.settled(self.settled));
+            tip.displacement = handeye_geometry::se3::exp(&self.scene.robot_errors.settled(self.settled));
         }
         self.let_slip(tree);
     }

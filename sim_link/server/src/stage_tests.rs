@@ -1,4 +1,7 @@
 use super::*;
+use std::path::Path;
+
+use handeye_cell::scene::{ArmErrorsSpec, ShippedScene};
 use handeye_cell::world::{Chain, paths};
 
 fn cell(scene: &Scene) -> (World, Stage, ResolvedScene) {
@@ -78,6 +81,53 @@ fn a_faulty_arm_stands_still_differently_after_every_move_and_not_while_it_stand
             world.run_pass();
         }
         world.run_pass();
+    }
+}
+
+#[test]
+fn the_arm_stands_as_its_true_chain_does_and_reports_as_the_nominal_one_whatever_arm_it_is() {
+    let on_track = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../core/arm/src/testing/arms/xarm6_on_track.urdf");
+    let of_ros = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../core/arm/src/testing/arms/ur5.urdf");
+    let on_track = format!(
+        "[robot]\nmodel = {{ urdf = {on_track:?}, tip = \"link6\" }}\nstart_joints_deg = [0.1, 0, -45, -35, 0, 80, 0]\n"
+    );
+    let of_ros = format!(
+        "[robot]\nmodel = {{ urdf = {of_ros:?}, tip = \"tool0\" }}\nstart_joints_deg = [0, -90, 90, -90, -90, 0]\n\
+         joint_offset_deg = [0, 0.1, 0, -0.2, 0, 0.3]\n"
+    );
+    let mut scenes = [
+        ShippedScene::Nominal.scene().expect("it is shipped"),
+        ShippedScene::Panda.scene().expect("it is shipped"),
+        Scene::from_toml(&on_track).expect("valid"),
+        Scene::from_toml(&of_ros).expect("valid"),
+    ];
+    for scene in &mut scenes {
+        scene.robot.arm_errors = ArmErrorsSpec { angle_deg: 0.5, length_mm: 3.0, compliance_deg: 0.3 };
+        let (mut world, stage, resolved) = cell(scene);
+        let name = &resolved.arm_model;
+        world.start_simulation();
+        let shift = |i: usize, by: f64| resolved.start_joints[i] + by * (0.1 + 0.03 * i as f64);
+        for by in [0.0, 0.5, 1.0] {
+            let joints = JointValues::from_fn(stage.joints.len(), |i| shift(i, by));
+            for (joint, position) in stage.joints.iter().zip(&joints) {
+                world.tree.joint_mut(*joint).expect("joint").set_position(*position).expect("finite");
+            }
+            world.run_pass();
+            let place = |object: Handle, chain: Chain| world.tree.world_pose(object, chain).expect("exists");
+            let [reported, actual] = [Chain::Reported, Chain::Actual].map(|chain| place(stage.tip, chain));
+            assert!(near(&reported, resolved.reported_tip(&joints).expect("its joints").isometry()), "{name:?}");
+            assert!(near(&actual, resolved.true_tip(&joints, 0).expect("its joints").isometry()), "{name:?}");
+            // The camera goes with the tip, and the links that are drawn with their joints.
+            assert!(near(&place(stage.camera, Chain::Actual), &(actual * resolved.tip_from_sensor.isometry())));
+            let off = |object: Handle| place(object, Chain::Reported).inv_mul(&place(object, Chain::Actual));
+            assert!(near(&off(stage.joints[0]), &Isometry3::identity()), "{name:?}");
+            for (joint, value) in stage.joints.iter().zip(&joints).skip(1) {
+                assert!(off(*joint).translation.vector.norm() > 1e-4, "{name:?}");
+                let link = world.tree.get(*joint).expect("exists").children()[0];
+                let turn = world.tree.joint(*joint).expect("a joint").motion(*value);
+                assert!(near(&place(link, Chain::Actual), &(place(*joint, Chain::Actual) * turn)), "{name:?}");
+            }
+        }
     }
 }
 

@@ -304,6 +304,7 @@ fn what_cannot_be_built_is_refused_by_name_and_what_coppeliasim_has_itself_is_na
         ("robot.name", "[robot]\nname = 'Panda'"),
         ("robot.repeatability_mm", "[robot]\nrepeatability_mm = 0.05"),
         ("robot.joint_offset_deg", "[robot]\njoint_offset_deg = [0, 0.1, 0, 0, 0, 0]"),
+        ("robot.arm_errors", "[robot]\narm_errors = { angle_deg = 0.07 }"),
         ("robot.max_joints_deg has 5 values", "[robot]\nmax_joints_deg = [90, 90, 90, 90, 90]"),
         ("camera.fx, camera.fy", "[camera]\nfx = 600.0\nfy = 600.0\ncx = 320.0\ncy = 240.0"),
         ("camera.distortion", "[camera]\ndistortion = { model = 'fisheye', coefficients = [0.1, 0, 0, 0] }"),

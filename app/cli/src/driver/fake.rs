@@ -20,7 +20,7 @@ pub struct FakeArgs {
     #[arg(long, value_name = "N", help_heading = heading::CELL)]
     seed: Option<u64>,
     /// Be a driver of a cell that runs already (`handeye cell`) and not of one of its own.
-    #[arg(long, value_name = "ADDR", conflicts_with_all = ["scene", "seed"], help_heading = heading::CELL)]
+    #[arg(long, value_name = "ADDR", conflicts_with_all = ["scene", "arm_errors", "seed"], help_heading = heading::CELL)]
     connect: Option<Endpoint>,
     /// Be the driver of one part alone, so that robot and camera are two programs.
     #[arg(long, value_name = "PART", help_heading = heading::CELL)]

@@ -43,6 +43,7 @@ fn name(scene: &SceneChoice, language: Language) -> String {
     let words = match shipped {
         ShippedScene::Reference => tr!(language, "UR5, exact"),
         ShippedScene::Realistic => tr!(language, "UR5, with the errors of a real cell"),
+        ShippedScene::Nominal => tr!(language, "UR5, with links that are a little off"),
         ShippedScene::Coppeliasim => tr!(language, "UR5, as CoppeliaSim shows it"),
         ShippedScene::Tracking => tr!(language, "UR5, moving board"),
         ShippedScene::Panda => tr!(language, "Franka Panda, seven joints"),

@@ -6,6 +6,7 @@ use handeye_arm::ArmKind;
 use handeye_cell::scene::ShippedScene;
 use handeye_driver::DriverSpec;
 
+use crate::arguments::ArmErrorsChoice;
 use crate::text::Language;
 use crate::tr;
 
@@ -158,6 +159,7 @@ pub static ALL: &[Offered] = &[
         fields: &[
             robot_field("--scene", Word(|| ShippedScene::ALL.into_iter().map(ShippedScene::name).collect()), Usual),
             robot_field("--seed", Text("1"), Usual),
+            robot_field("--arm-errors", Word(|| ArmErrorsChoice::NAMES.to_vec()), More),
             robot_field("--connect", Text("tcp://127.0.0.1:23000"), More),
             robot_field("--only", Word(|| vec!["robot", "camera"]), More),
             robot_field("--clock", Text("0"), More),
@@ -310,6 +312,7 @@ impl Field {
             "--hold" => tr!(language, "Show each for [s]"),
             "--scene" => tr!(language, "Scene"),
             "--seed" => tr!(language, "Seed"),
+            "--arm-errors" => tr!(language, "Errors of the links"),
             "--connect" => tr!(language, "Running cell"),
             "--only" => tr!(language, "One part alone"),
             _ => tr!(language, "Clock begins at [s]"),

@@ -8,8 +8,8 @@ use super::Scene;
 use super::error::Violation;
 use super::resolved::intrinsics;
 use super::spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, PrintSpec, RobotSpec, SimulationSpec, SlipSpec,
-    SolidSpec,
+    ArmErrorsSpec, BoardSpec, CameraSpec, DepthSpec, ImageSpec, LightSpec, PoseSpec, PrintSpec, RobotSpec,
+    SimulationSpec, SlipSpec, SolidSpec,
 };
 use handeye_motion::OutOfRange;
 
@@ -109,6 +109,7 @@ fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
         repeatability_mm,
         repeatability_deg,
         joint_offset_deg,
+        arm_errors,
     } = robot;
     if name.is_empty() || name.len() > 100 || name.contains(|c: char| "/[]{}*?".contains(c) || c.is_control()) {
         return violation("robot.name", name, "1 to 100 characters, none of them / [ ] { } * ?");
@@ -157,7 +158,16 @@ fn check_robot(robot: &RobotSpec, chain: Arm) -> Result<Arm, Violation> {
     in_range("robot.rest_error_deg", *rest_error_deg, 0.0, 1.0)?;
     in_range("robot.repeatability_mm", *repeatability_mm, 0.0, 10.0)?;
     in_range("robot.repeatability_deg", *repeatability_deg, 0.0, 5.0)?;
+    check_arm_errors(arm_errors)?;
     Ok(chain.with_ranges(&ranges).expect("a range for each joint, with room; both were checked"))
+}
+
+/// Above these it is another arm rather than one with errors.
+fn check_arm_errors(errors: &ArmErrorsSpec) -> Check {
+    let ArmErrorsSpec { angle_deg, length_mm, compliance_deg } = errors;
+    in_range("robot.arm_errors.angle_deg", *angle_deg, 0.0, 2.0)?;
+    in_range("robot.arm_errors.length_mm", *length_mm, 0.0, 10.0)?;
+    in_range("robot.arm_errors.compliance_deg", *compliance_deg, 0.0, 2.0)
 }
 
 fn check_camera(camera: &CameraSpec) -> Check {

@@ -1,29 +1,33 @@
 //! How the arm's true pose differs from the one it reports.
 
-use nalgebra::Vector6;
+use nalgebra::{Isometry3, Vector6};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::RobotSpec;
-use handeye_arm::JointValues;
+use super::errors_of_arm::drawn;
+use super::{JointError, RobotSpec};
+use handeye_arm::{Arm, JointValues};
 
 /// First stream of random numbers that belongs to settled positions; the ones below are the scene's own.
 const FIRST_STREAM: u64 = 1 << 32;
 
 /// The errors of one robot.
 ///
-/// What the robot *reports* is the nominal kinematics of its encoders: `forward(q)`. Where it really *is* has two
-/// errors more: constant joint offsets, and a displacement that differs every time it comes to rest,
+/// What the robot *reports* is the nominal kinematics of its encoders: `forward(q)`. Where it really *is* has three
+/// errors more: constant joint offsets, links other than the nominal ones, and a displacement that differs every time it comes
+/// to rest,
 ///
-/// `true = forward(q + joint_offset) * connection_from_tip * exp(settled(n))`
+/// `true = forward_with_errors(q + joint_offset) * connection_from_tip * exp(settled(n))`
 ///
 /// with the tangent vector `[t; r]` in the tip frame. `n` counts the times that the arm has come to rest: while it
 /// stands still its pose does not change, however often it is asked.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RobotErrors {
     /// What is added to the joint values that the encoders show, radians.
     pub joint_offset_rad: JointValues,
+    /// What is off about each joint.
+    pub joints: Vec<JointError>,
     /// 1σ per axis of the displacement, metres.
     pub repeatability_m: f64,
     /// 1σ per axis of the rotation, radians.
@@ -32,19 +36,15 @@ pub struct RobotErrors {
 }
 
 impl RobotErrors {
-    pub(super) fn new(robot: &RobotSpec, joints: usize, seed: u64) -> Self {
-        let offset_deg = robot.joint_offset_deg.unwrap_or(JointValues::zeros(joints));
+    pub(super) fn new(robot: &RobotSpec, arm: &Arm, seed: u64) -> Self {
+        let offset_deg = robot.joint_offset_deg.unwrap_or(JointValues::zeros(arm.joint_count()));
         Self {
             joint_offset_rad: offset_deg.map(f64::to_radians),
+            joints: drawn(&robot.arm_errors, arm, seed),
             repeatability_m: robot.repeatability_mm * 1e-3,
             repeatability_rad: robot.repeatability_deg.to_radians(),
             seed,
         }
-    }
-
-    /// A robot of so many joints without errors.
-    pub fn none(joints: usize) -> Self {
-        Self { joint_offset_rad: JointValues::zeros(joints), repeatability_m: 0.0, repeatability_rad: 0.0, seed: 0 }
     }
 
     /// True minus nominal pose of the tip, `[t; r]` in metres and radians in the tip frame, the `index`-th time that
@@ -53,10 +53,11 @@ impl RobotErrors {
         gaussian(self.seed, FIRST_STREAM.wrapping_add(index), self.repeatability_m, self.repeatability_rad)
     }
 
-    /// The true joint values for those that the encoders show, radians.
-    pub fn true_joints(&self, encoders: &JointValues) -> JointValues {
-        let offset = |i: usize| self.joint_offset_rad.get(i).copied().unwrap_or_default();
-        JointValues::from_fn(encoders.len(), |i| encoders[i] + offset(i))
+    /// Where each joint really is, in its frame at rest turned so that the axis is z, with gravity that turns each with a share
+    /// of the largest torque.
+    pub(super) fn displacements(&self, gravity: &[f64]) -> Vec<Isometry3<f64>> {
+        let errors = self.joints.iter().zip(&self.joint_offset_rad).zip(gravity);
+        errors.map(|((error, offset_rad), gravity)| error.displacement(*offset_rad, *gravity)).collect()
     }
 }
 

@@ -7,6 +7,7 @@
 mod arm;
 mod check;
 mod error;
+mod errors_of_arm;
 mod errors_of_robot;
 mod locate;
 mod print;
@@ -22,13 +23,14 @@ use serde::{Deserialize, Serialize};
 
 pub use arm::{ArmSpec, UrdfSpec};
 pub use error::SceneError;
+pub use errors_of_arm::JointError;
 pub use errors_of_robot::RobotErrors;
 pub use handeye_motion::{BoardMotionSpec, BoardPath, UnknownPath};
 pub use resolved::{ResolvedScene, ResolvedSolid};
 pub use shipped::{SceneChoice, ShippedScene};
 pub use spec::{
-    BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, PoseSpec, PrintSpec, RelativeTo, RobotSpec,
-    SimulationSpec, SlipSpec, SolidSpec,
+    ArmErrorsSpec, BoardSpec, CameraSpec, DepthSpec, ImageSpec, JointModeSpec, LightSpec, PoseSpec, PrintSpec,
+    RelativeTo, RobotSpec, SimulationSpec, SlipSpec, SolidSpec,
 };
 
 /// A scene file.

@@ -12,6 +12,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use super::Scene;
 use super::arm::ArmSpec;
 use super::check::si;
+use super::errors_of_arm;
 use super::errors_of_robot::{RobotErrors, gaussian, stream_of};
 use super::print::printed;
 use super::spec::{
@@ -115,10 +116,21 @@ impl ResolvedScene {
     /// # Errors
     /// As [`Self::reported_tip`].
     pub fn true_tip(&self, encoders: &JointValues, settled_index: u64) -> Result<Pose<Base, Tip>, ArmError> {
-        let joints = self.robot_errors.true_joints(encoders);
+        let of_joints = self.joint_displacements(encoders)?;
         let settled = se3::exp(&self.robot_errors.settled(settled_index));
-        let arm_from_tip = self.arm.forward(&joints)?.isometry() * self.connection_from_tip * settled;
-        Ok(Pose::from_isometry(self.world_from_arm * arm_from_tip))
+        let arm_from_connection = *self.arm.displaced(&of_joints)?.forward(encoders)?.isometry();
+        Ok(Pose::from_isometry(self.world_from_arm * arm_from_connection * self.connection_from_tip * settled))
+    }
+
+    /// Where each joint really is with these values of the encoders, in its frame at rest turned so that the axis is z
+    /// ([`handeye_arm::Joint::joint_from_axis`]): by joint offsets and the errors of the links.
+    ///
+    /// # Errors
+    /// As [`Self::reported_tip`].
+    pub fn joint_displacements(&self, encoders: &JointValues) -> Result<Vec<Isometry3<f64>>, ArmError> {
+        let down = self.world_from_arm.rotation.inverse() * -Vector3::z();
+        let gravity = errors_of_arm::gravity(&self.arm, &self.connection_from_tip, &down, encoders)?;
+        Ok(self.robot_errors.displacements(&gravity))
     }
 
     /// What its sensors do to an image and to depth.
@@ -209,7 +221,7 @@ pub(super) fn resolve(scene: &Scene, arm: Arm, seed: u64) -> ResolvedScene {
         start_joints: JointValues::from_fn(arm.joint_count(), |i| si(arm.joints()[i].kind, robot.start_joints_deg[i])),
         joint_mode: robot.joint_mode,
         rest_error: robot.rest_error_deg.to_radians(),
-        robot_errors: RobotErrors::new(robot, arm.joint_count(), seed),
+        robot_errors: RobotErrors::new(robot, &arm, seed),
         arm,
         arm_model: robot.model.clone(),
         arm_name: robot.name.clone(),

@@ -16,6 +16,8 @@ pub enum ShippedScene {
     Reference,
     /// The same cell with the faults of a good real one: a lens, a little noise, a robot that repeats to 0.05 mm.
     Realistic,
+    /// The realistic cell with a robot that repeats well and whose links are off the nominal ones as those of a usual arm.
+    Nominal,
     /// The realistic cell with a board that moves in a circle, and images that come as fast as a camera's.
     Tracking,
     /// The reference cell with images, depth, print and arm as CoppeliaSim's own are.
@@ -28,14 +30,15 @@ pub enum ShippedScene {
 
 impl ShippedScene {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Reference, Self::Realistic, Self::Coppeliasim, Self::Tracking, Self::Panda, Self::Xarm6];
+    pub const ALL: [Self; 7] =
+        [Self::Reference, Self::Realistic, Self::Nominal, Self::Coppeliasim, Self::Tracking, Self::Panda, Self::Xarm6];
 
     /// The name by which it is asked for: that of its file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reference => "reference",
             Self::Realistic => "realistic",
+            Self::Nominal => "nominal",
             Self::Coppeliasim => "coppeliasim",
             Self::Tracking => "tracking",
             Self::Panda => "panda",
@@ -48,6 +51,7 @@ impl ShippedScene {
         match self {
             Self::Reference => (include_str!("../../../../assets/scenes/reference.toml"), None),
             Self::Realistic => (include_str!("../../../../assets/scenes/realistic.toml"), None),
+            Self::Nominal => (include_str!("../../../../assets/scenes/nominal.toml"), None),
             Self::Coppeliasim => (include_str!("../../../../assets/scenes/coppeliasim.toml"), None),
             Self::Tracking => (include_str!("../../../../assets/scenes/tracking.toml"), None),
             Self::Panda => (
@@ -172,7 +176,7 @@ mod tests {
     fn a_name_that_no_scene_has_is_answered_with_those_that_there_are() {
         let reported = |choice: &str| choice.parse::<SceneChoice>().unwrap().load().unwrap_err().to_string();
         assert!(
-            reported("Panda").contains("reference, realistic, coppeliasim, tracking, panda, xarm6"),
+            reported("Panda").contains("reference, realistic, nominal, coppeliasim, tracking, panda, xarm6"),
             "{}",
             reported("Panda")
         );

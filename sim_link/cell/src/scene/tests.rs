@@ -7,7 +7,7 @@ use handeye_wire::axes::sensor_from_camera;
 use nalgebra::{Point3, Vector2, Vector3};
 
 /// World poses of the tip that the public script drives to, `[x y z qx qy qz qw]`; it lists one of them twice.
-const TAUGHT: [[f64; 7]; 10] = [
+pub(super) const TAUGHT: [[f64; 7]; 10] = [
     [-0.1100547924, -0.0159581117, 0.8466254223, 0.5609105895, -0.5609503047, 0.4305463900, 0.4305158212],
     [-0.1659581117, -0.0159581117, 0.8216254223, 0.5417925805, -0.4495188050, 0.5757261663, 0.4158521675],
     [-0.1100547924, -0.0159581117, 0.8216254223, 0.0000321293, 0.7932742610, -0.6088644722, 0.0000171275],
@@ -20,7 +20,7 @@ const TAUGHT: [[f64; 7]; 10] = [
     [-0.1010000548, -0.0159581117, 0.8016254223, 0.5212515544, -0.5212938038, 0.4777945964, 0.4777676326],
 ];
 
-fn taught(index: usize) -> Pose<Base, Tip> {
+pub(super) fn taught(index: usize) -> Pose<Base, Tip> {
     let [x, y, z, qx, qy, qz, qw] = TAUGHT[index];
     Pose::from_translation_xyzw([x, y, z], [qx, qy, qz, qw])
 }
@@ -42,7 +42,8 @@ fn the_defaults_are_the_reference_scene() {
 
 #[test]
 fn the_scenes_that_are_built_in_are_valid_and_keep_their_numbers_as_files() {
-    for scene in [Scene::reference().unwrap(), Scene::realistic().unwrap(), Scene::tracking().unwrap()] {
+    for shipped in [ShippedScene::Reference, ShippedScene::Realistic, ShippedScene::Nominal, ShippedScene::Tracking] {
+        let scene = shipped.scene().unwrap();
         scene.resolve(7).unwrap();
         let text = toml::to_string(&scene).unwrap();
         assert_eq!(Scene::from_toml(&text).unwrap(), scene);
@@ -57,6 +58,17 @@ fn the_tracking_scene_is_the_realistic_one_but_for_its_time_step_and_the_motion_
     scene.simulation.time_step_s = SimulationSpec::default().time_step_s;
     scene.board.motion = BoardMotionSpec::default();
     assert_eq!(scene, Scene::realistic().unwrap());
+}
+
+#[test]
+fn the_nominal_scene_is_the_realistic_one_but_for_a_good_robot_with_the_links_of_a_usual_arm() {
+    let mut scene = ShippedScene::Nominal.scene().unwrap();
+    assert_eq!((scene.robot.repeatability_mm, scene.robot.repeatability_deg), (0.02, 0.005));
+    assert_eq!(scene.robot.arm_errors, ArmErrorsSpec::NOMINAL);
+    let realistic = Scene::realistic().unwrap();
+    assert_eq!(realistic.robot.arm_errors, ArmErrorsSpec::NONE);
+    scene.robot = realistic.robot.clone();
+    assert_eq!(scene, realistic);
 }
 
 #[test]
@@ -298,7 +310,7 @@ fn a_solid_on_the_board_goes_where_the_board_goes() {
 
 #[test]
 fn mistakes_in_a_file_are_found_at_their_line() {
-    let cases: [(&str, usize, &str); 16] = [
+    let cases: [(&str, usize, &str); 20] = [
         ("[camera]\nnear = 0.1\n", 2, "camera.near"),
         ("[camera]\nwidth = 640\nheight = \"tall\"\n", 3, "camera.height"),
         ("[robot\n", 1, ""),
@@ -309,6 +321,10 @@ fn mistakes_in_a_file_are_found_at_their_line() {
         ("[board.slip]\nat_stop = 1\nby_mm = [5, 0, nan]\n", 3, "board.slip.by_mm[2]"),
         ("[board.print]\nbitmap_px = [1024, 30]\n", 2, "board.print.bitmap_px[1]"),
         ("[board.print]\nwhite_mm = 1.0\n", 2, "board.print.white_mm"),
+        ("[robot]\narm_errors = { angle_deg = 2.1 }\n", 2, "robot.arm_errors.angle_deg"),
+        ("[robot.arm_errors]\nangle_deg = 0.1\nlength_mm = -0.1\n", 3, "robot.arm_errors.length_mm"),
+        ("[robot]\narm_errors = { compliance_deg = nan }\n", 2, "robot.arm_errors.compliance_deg"),
+        ("[robot]\narm_errors = { angle = 0.1 }\n", 2, "robot.arm_errors.angle"),
         // Not written down: the line of its table.
         ("\n[camera]\n\nnear_m = 5.0\n", 2, "camera.far_m"),
         ("\n[camera]\nfx = 500.0\n", 2, "camera.fy"),

@@ -5,7 +5,7 @@ mod motion;
 
 use std::sync::{Mutex, PoisonError};
 
-use handeye_cell::scene::SceneChoice;
+use handeye_cell::scene::{ArmErrorsSpec, Scene, SceneChoice};
 use handeye_coppeliasim::cell::{self, Arm, CameraFeed, CellInfo, CellPaths};
 use handeye_coppeliasim::{BadEndpoint, CancelToken, ConnectionOptions, Endpoint, LinkError, Sim, SimulationState};
 use handeye_geometry::frames::{Base, Pose, Target};
@@ -30,8 +30,8 @@ pub struct RemoteCell {
 }
 
 enum Server {
-    /// Started by this program.
-    BuiltIn(SceneChoice),
+    /// Started by this program; with other errors of the arm than the scene has, where they are given.
+    BuiltIn(SceneChoice, Option<ArmErrorsSpec>),
     /// The same, started by who holds the cell, and never started again.
     Own(CellServer),
     /// There already.
@@ -39,9 +39,10 @@ enum Server {
 }
 
 impl RemoteCell {
-    /// To the built-in cell with a scene; it is started when it is first connected to.
-    pub fn built_in(scene: SceneChoice) -> Self {
-        Self { cell: Server::BuiltIn(scene), paths: CellPaths::default(), server: Mutex::new(None) }
+    /// To the built-in cell with a scene, and with other errors of the arm where they are given; it is started when it is first
+    /// connected to.
+    pub fn built_in(scene: SceneChoice, arm_errors: Option<ArmErrorsSpec>) -> Self {
+        Self { cell: Server::BuiltIn(scene, arm_errors), paths: CellPaths::default(), server: Mutex::new(None) }
     }
 
     /// To a built-in cell that was started for this alone. It ends with this.
@@ -59,11 +60,11 @@ impl RemoteCell {
         let address = match &self.cell {
             Server::At(address) => address.clone(),
             Server::Own(server) => server.endpoint(),
-            Server::BuiltIn(scene) => {
+            Server::BuiltIn(scene, arm_errors) => {
                 let mut server = self.server.lock().unwrap_or_else(PoisonError::into_inner);
                 match server.as_ref() {
                     Some(server) => server.endpoint(),
-                    None => server.insert(start_built_in(scene)?).endpoint(),
+                    None => server.insert(start_built_in(scene, *arm_errors)?).endpoint(),
                 }
             }
         };
@@ -78,12 +79,12 @@ impl RemoteCell {
     ) -> Result<Half, PortError> {
         let endpoint = self.endpoint()?;
         let usual = match &self.cell {
-            Server::BuiltIn(_) | Server::Own(_) => ConnectionOptions::own_cell(),
+            Server::BuiltIn(..) | Server::Own(_) => ConnectionOptions::own_cell(),
             Server::At(_) => ConnectionOptions::default(),
         };
         let options = ConnectionOptions { shutdown: shutdown.clone(), ..usual };
         let connected = half(&endpoint, &options, &self.paths);
-        if let (Err(LinkError::OwnCellEnded { .. }), Server::BuiltIn(_)) = (&connected, &self.cell) {
+        if let (Err(LinkError::OwnCellEnded { .. }), Server::BuiltIn(..)) = (&connected, &self.cell) {
             self.give_up_server(&endpoint);
         }
         connected.map_err(port_error)
@@ -103,7 +104,7 @@ impl RemoteCell {
     }
 
     fn describe(&self, info: &CellInfo) -> String {
-        if matches!(self.cell, Server::BuiltIn(_) | Server::Own(_)) {
+        if matches!(self.cell, Server::BuiltIn(..) | Server::Own(_)) {
             return "built-in cell".to_owned();
         }
         if info.is_handeye_cell {
@@ -251,7 +252,33 @@ fn renew(sim: &mut Sim) -> Result<(), PortError> {
     sim.get_simulation_time().map(drop).map_err(port_error)
 }
 
-fn start_built_in(scene: &SceneChoice) -> Result<CellServer, PortError> {
-    let scene = scene.load().map_err(|error| PortError::Hopeless(error.into()))?;
+fn start_built_in(scene: &SceneChoice, arm_errors: Option<ArmErrorsSpec>) -> Result<CellServer, PortError> {
+    let scene = scene_with(scene, arm_errors)?;
     CellServer::start(CellConfig::new(scene)).map_err(|error| PortError::Hopeless(error.into()))
+}
+
+fn scene_with(scene: &SceneChoice, arm_errors: Option<ArmErrorsSpec>) -> Result<Scene, PortError> {
+    let mut scene = scene.load().map_err(|error| PortError::Hopeless(error.into()))?;
+    scene.robot.arm_errors = arm_errors.unwrap_or(scene.robot.arm_errors);
+    Ok(scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use handeye_cell::scene::ShippedScene;
+
+    use super::*;
+
+    #[test]
+    fn errors_of_the_arm_that_are_given_take_the_place_of_the_scene_s() {
+        for (scene, given, expected) in [
+            (ShippedScene::Nominal, None, ArmErrorsSpec::NOMINAL),
+            (ShippedScene::Nominal, Some(ArmErrorsSpec::NONE), ArmErrorsSpec::NONE),
+            (ShippedScene::Panda, None, ArmErrorsSpec::NONE),
+            (ShippedScene::Panda, Some(ArmErrorsSpec::NOMINAL), ArmErrorsSpec::NOMINAL),
+        ] {
+            let started = scene_with(&SceneChoice::Shipped(scene), given).expect("it is shipped");
+            assert_eq!(started.robot.arm_errors, expected, "{scene:?}");
+        }
+    }
 }

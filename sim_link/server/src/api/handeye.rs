@@ -100,11 +100,22 @@ fn intrinsics(camera: &Intrinsics) -> Value {
     ])
 }
 
+/// `joints` has what is off about each joint's frame, whose z is its axis: the axis' direction (a rotation vector along x and
+/// y) and place (x, y), the zero, and what the joint gives way by under the largest torque of gravity.
 fn robot(errors: &RobotErrors) -> Value {
+    let joints = errors.joints.iter().map(|joint| {
+        wire::map([
+            ("tilt_rad", wire::floats(joint.tilt_rad)),
+            ("shift_m", wire::floats(joint.shift_m)),
+            ("zero_rad", Value::Float(joint.zero_rad)),
+            ("compliance_rad", Value::Float(joint.compliance_rad)),
+        ])
+    });
     wire::map([
         ("repeatability_m", Value::Float(errors.repeatability_m)),
         ("repeatability_rad", Value::Float(errors.repeatability_rad)),
         ("joint_offset_rad", wire::floats(errors.joint_offset_rad.iter().copied())),
+        ("joints", Value::Array(joints.collect())),
     ])
 }
 

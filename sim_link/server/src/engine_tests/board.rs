@@ -111,6 +111,45 @@ fn reprojection_error(bench: &mut Bench, scene: &ResolvedScene) -> f64 {
     scene.target.points().into_iter().map(error).fold(0.0, f64::max)
 }
 
+/// Largest distance of a measured corner from where it is for a camera on this tip, pixels.
+fn error_from(image: &Grey, scene: &ResolvedScene, base_from_tip: &Pose<Base, Tip>) -> f64 {
+    let camera_from_target = scene.camera_from_target(base_from_tip);
+    let error = |point: Point3<f64>| {
+        let px = scene.intrinsics.project(&(camera_from_target * PointIn::new(point)).point()).expect("in front");
+        (image.corner_near(px) - px).norm()
+    };
+    scene.target.points().into_iter().map(error).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_image_is_seen_from_where_the_arm_truly_is_and_not_from_where_it_reports() {
+    let mut scene = Scene::default();
+    scene.robot.arm_errors = handeye_cell::scene::ArmErrorsSpec::NOMINAL;
+    let resolved = scene.resolve(scene.seed).expect("valid");
+    let mut bench = Bench::stepping(&scene);
+    for swing in [0.0, 0.04, -0.05] {
+        let joints: [f64; 6] =
+            std::array::from_fn(|i| resolved.start_joints[i] + swing * [0.5, -0.4, 0.8, 0.6, -0.7, 1.5][i]);
+        bench.put(&joints);
+        bench.call(A, "sim.step", vec![]);
+        let (moment, truth) = (bench.moment(), bench.get("handeye.truth", vec![]));
+        let nominal = resolved.reported_tip(&joints.into()).expect("six joints");
+        let reported: Pose<Base, Tip> = pose(&moment, "tip");
+        assert!(reported.distance_to(&nominal).0 < 1e-12);
+        let published: Pose<Tip, Camera> = pose(&truth, "tip_from_camera");
+        assert!(published.distance_to(&resolved.tip_from_camera).0 < 1e-12);
+        let image = bench.image();
+        let real = resolved.true_tip(&joints.into(), 0).expect("six joints");
+        // As exact as without errors; a millimetre is 1.5 pixels.
+        assert!(error_from(&image, &resolved, &real) < 0.1);
+        assert!(error_from(&image, &resolved, &reported) > 0.5);
+    }
+    let joints = bench.get("handeye.truth", vec![]).get("robot").and_then(|robot| robot.get("joints").cloned());
+    let joints = joints.expect("they are published");
+    let tilts = joints.list().expect("a list").iter().map(|joint| joint.get("tilt_rad").and_then(Reader::numbers));
+    assert!(tilts.eq(resolved.robot_errors.joints.iter().map(|joint| Some(joint.tilt_rad.to_vec()))));
+}
+
 #[test]
 fn the_image_shows_the_board_where_the_moment_says_while_board_and_arm_move() {
     let mut scene = Scene::default();
