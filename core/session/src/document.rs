@@ -226,7 +226,7 @@ impl SessionMeta {
         if let Some(Err(why)) = self.arm.as_ref().map(ArmModel::arm) {
             return Err(bad("arm", text!("is of no use: {why}", why = why)));
         }
-        if self.tool_m.iter().flatten().any(|metres| !(metres.abs() <= LONGEST_TOOL_M)) {
+        if self.tool_m.iter().flatten().any(|metres| !(-LONGEST_TOOL_M..=LONGEST_TOOL_M).contains(metres)) {
             return Err(bad("tool_m", text!("is not finite, or longer than {most} m", most = LONGEST_TOOL_M)));
         }
         if self.joint_kinds.as_ref().is_some_and(|kinds| kinds.is_empty() || kinds.len() > MAX_JOINTS) {
