@@ -12,6 +12,8 @@ use handeye_result::{
     ViewRecordStatus,
 };
 
+use nalgebra::Vector3;
+
 pub use markdown::markdown;
 pub use page::{of_session, page, shared_camera};
 

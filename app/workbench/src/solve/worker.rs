@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use handeye_estimate::diagnose::examine;
 use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
-use handeye_estimate::diagnose::{Calibration, examine};
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::placement::ArmOfViews;
 use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
