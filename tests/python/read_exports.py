@@ -8,12 +8,13 @@ With --cases every folder in FOLDER has exports/, result.json and context.json. 
 (`names`) and its views (`views`: name, translation_m, rotation_xyzw of base_from_tip); without one the names are the
 defaults and there are no views.
 
-Readers: OpenCV, PyYAML, urdf_parser_py, xacro, pycolmap, a POSIX shell, and Python's json, ast and XML. Where a format's
-own reader is not on PyPI (ROS, Kalibr, mrcal, ViSP, Zivid, MATLAB, nerfstudio), its checks are written down here. Prints
-one line per file; exits with 1 when a file differs or has no reader, 2 when there is none.
+Readers: OpenCV, PyYAML, urdf_parser_py, Pinocchio, xacro, pycolmap, a POSIX shell, and Python's json, ast, csv and XML. Where
+a format's own reader is not on PyPI (ROS, Kalibr, mrcal, ViSP, Zivid, MATLAB, nerfstudio, Universal Robots' driver), its checks
+are written down here. Prints one line per file; exits with 1 when a file differs or has no reader, 2 when there is none.
 """
 
 import ast
+import csv
 import json
 import os
 import pathlib
@@ -25,6 +26,7 @@ import xml.etree.ElementTree as ElementTree
 
 import cv2
 import numpy as np
+import pinocchio
 import pycolmap
 import xacro
 import yaml
@@ -473,6 +475,104 @@ def check_nerfstudio(path, case):
         close(view["name"], c2w, case.base_from_camera(view))
 
 
+def isometry(said):
+    return matrix_of(said["translation"], said["rotation"])
+
+
+def along_z(axis):
+    """The shortest turn that has z along an axis."""
+    cross = np.cross([0.0, 0.0, 1.0], axis)
+    if np.linalg.norm(cross) < 1e-12:
+        return np.eye(4) if axis[2] > 0 else matrix_of_vector(np.zeros(3), [np.pi, 0, 0])
+    angle = np.arctan2(np.linalg.norm(cross), axis[2])
+    return matrix_of_vector(np.zeros(3), cross / np.linalg.norm(cross) * angle)
+
+
+def turn_z(angle):
+    return matrix_of_rpy(np.zeros(3), [0.0, 0.0, angle])
+
+
+def corrected_tip(arm, values):
+    """base_from_tip of the corrected arm of a result, without compliance: an error stands before the motion of its joint."""
+    chain = arm["chain"]
+    out = isometry(chain["base_from_first"])
+    for joint, errors, value in zip(chain["joints"], arm["joints"], values):
+        axis, number = along_z(np.array(joint["axis"])), lambda key, zero: zero if errors[key] is None else errors[key]
+        shift, tilt = number("shift_mm", [0.0, 0.0]), number("tilt_deg", [0.0, 0.0])
+        error = matrix_of_vector(np.array([*shift, 0.0]) * 1e-3, np.radians([*tilt, number("zero_deg", 0.0)]))
+        out = out @ isometry(joint["previous_from_joint"]) @ axis @ error @ turn_z(value) @ np.linalg.inv(axis)
+    return out @ isometry(chain["last_from_flange"]) @ isometry(chain["flange_from_tip"])
+
+
+def configurations(arm):
+    """Values for every joint, among them none special."""
+    count = len(arm["joints"])
+    return [np.zeros(count), *np.random.default_rng(7).uniform(-3.0, 3.0, (5, count))]
+
+
+def check_arm_urdf(path, case):
+    """Links, joints and limits by urdf_parser_py, forward kinematics by Pinocchio."""
+    arm, robot = case.result["arm"], URDF.from_xml_string(path.read_bytes())
+    equal("root of the tree", robot.get_root(), case.names["base_frame"])
+    equal("last link", robot.joints[-1].child, case.names["effector_frame"])
+    moving, said = robot.joints[:-1], arm["chain"]["joints"]
+    equal("joints", len(moving), len(said))
+    equal("type of the last one", robot.joints[-1].type, "fixed")
+    for joint, expected in zip(moving, said):
+        ends = expected["min"], expected["max"]
+        equal("type", joint.type, "continuous" if ends == (None, None) else "revolute")
+        if joint.type == "revolute":
+            close("limits", [joint.limit.lower, joint.limit.upper], ends)
+        assert joint.limit.velocity > 0 and joint.limit.effort > 0
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data, frame = model.createData(), model.getFrameId(case.names["effector_frame"])
+    for values in configurations(arm):
+        q = pinocchio.neutral(model)
+        for joint, value in zip(moving, values):
+            place = model.joints[model.getJointId(joint.name)]
+            q[place.idx_q:place.idx_q + place.nq] = [value] if place.nq == 1 else [np.cos(value), np.sin(value)]
+        pinocchio.framesForwardKinematics(model, data, q)
+        close("tip", data.oMf[frame].homogeneous, corrected_tip(arm, values))
+
+
+UR_LINKS = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"]
+KEYS_OF_SIX = ["x", "y", "z", "roll", "pitch", "yaw"]
+
+
+def check_ur_kinematics(path, case):
+    """As ur_description's ur_macro.xacro reads it and puts links together, behind base_link and its half turn."""
+    kinematics, text = load_yaml(path)["kinematics"], path.read_text(encoding="utf-8")
+    equal("links", set(kinematics), {*UR_LINKS, "hash"})
+    assert re.fullmatch(r"calib_\d+", kinematics["hash"]), kinematics["hash"]
+    for link in UR_LINKS:
+        equal(link, set(kinematics[link]), set(KEYS_OF_SIX))
+        assert all(isinstance(value, float) for value in kinematics[link].values())
+    six = lambda numbers: matrix_of_rpy(numbers[:3], numbers[3:])
+    around = re.findall(r"^# (?:base|TCP) .*in .*: (-?[0-9].*)$", text, re.MULTILINE)
+    base_from_robot, tool0_from_tip = (six([float(value) for value in numbers.split()]) for numbers in around)
+    half_turn = turn_z(np.pi)
+    for values in configurations(case.result["arm"]):
+        base_link_from_link = half_turn
+        for link, value in zip(UR_LINKS, values):
+            base_link_from_link = base_link_from_link @ six([kinematics[link][k] for k in KEYS_OF_SIX]) @ turn_z(value)
+        tip = base_from_robot @ np.linalg.inv(half_turn) @ base_link_from_link @ tool0_from_tip
+        close("tip", tip, corrected_tip(case.result["arm"], values))
+
+
+def check_dh_table(path, case):
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    equal("rows", [row["joint"] for row in rows], ["base", *map(str, range(1, len(rows) - 1)), "tip"])
+    for values in configurations(case.result["arm"]):
+        tip = np.eye(4)
+        for row, value in zip(rows, [0.0, *values, 0.0]):
+            a, alpha, d, theta, beta = (float(row[k]) for k in ["a_m", "alpha_rad", "d_m", "theta_offset_rad", "beta_rad"])
+            link = matrix_of_rpy([a, 0.0, d], [alpha, 0.0, 0.0]) @ matrix_of_rpy(np.zeros(3), [0.0, beta, 0.0])
+            tip = tip @ turn_z(value + theta) @ link
+        close("tip", tip, corrected_tip(case.result["arm"], values))
+
+
+# The first that a name matches.
 READERS = {
     "calibration.json": check_json,
     "camera_info.yaml": check_ros_camera_info,
@@ -481,6 +581,9 @@ READERS = {
     "*_eye_on_*.yaml": check_easy_handeye,
     "static_transform_ros?.sh": check_static_transform,
     "transform_stamped.yaml": check_ros_tf,
+    "*_arm.urdf": check_arm_urdf,
+    "*_kinematics.yaml": check_ur_kinematics,
+    "*_dh.csv": check_dh_table,
     "*.urdf": check_urdf,
     "*.urdf.xacro": check_xacro,
     "*.launch": check_launch,
@@ -505,7 +608,7 @@ def check_folder(folder, result, context):
     found = failed = 0
     for path in sorted(folder.iterdir()):
         found += 1
-        checks = [check for pattern, check in READERS.items() if path.match(pattern)]
+        checks = [check for pattern, check in READERS.items() if path.match(pattern)][:1]
         try:
             if not checks and path.name not in BESIDE:
                 raise AssertionError("nothing here reads it")

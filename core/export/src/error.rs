@@ -58,6 +58,34 @@ pub enum ExportError {
         /// What to put into `dataset.toml`.
         instead: &'static str,
     },
+    /// A result without the errors of an arm, for a format about the arm.
+    #[error(
+        "{format} is about the robot's arm, and this result knows no errors of it: calibrate with the arm ([robot.arm] in dataset.toml, \
+         or a cell that says which it is) and joint values in every row, or export urdf or another format of the hand-eye"
+    )]
+    NeedsArm {
+        /// The format.
+        format: &'static str,
+    },
+    /// An arm that views left out speak against.
+    #[error(
+        "{format} is about the corrected arm, and views left out of this calibration are predicted worse by it than by the arm as its \
+         controller counts: capture more views and calibrate again, or export urdf or another format of the hand-eye"
+    )]
+    ArmContradicted {
+        /// The format.
+        format: &'static str,
+    },
+    /// An arm that the format cannot hold.
+    #[error(
+        "{format} cannot hold this arm: {problem}. Export arm_urdf or dh_table, which hold every arm of revolute joints"
+    )]
+    OtherArm {
+        /// The format.
+        format: &'static str,
+        /// What about it.
+        problem: &'static str,
+    },
     /// No view has a robot pose, for a format about the camera's pose in every image.
     #[error(
         "{format} has the camera's pose of every image, and no robot poses are given: export from the session or \

@@ -18,7 +18,10 @@
 //! A new format is one file here, one entry in [`formats`] and one row of the documentation. Never depends on images, sessions or
 //! data sets.
 
+mod arm_urdf;
 mod colmap;
+mod corrected;
+mod dh_table;
 mod easy_handeye;
 mod easy_handeye2;
 mod error;
@@ -38,6 +41,8 @@ mod ros_tf;
 mod rotation;
 mod static_transform;
 mod text;
+mod ur_frames;
+mod ur_kinematics;
 mod urdf;
 mod visp;
 mod xacro;
@@ -119,6 +124,9 @@ pub fn formats() -> &'static [&'static dyn Format] {
         &matlab::Matlab,
         &colmap::Colmap,
         &nerfstudio::Nerfstudio,
+        &arm_urdf::ArmUrdf,
+        &ur_kinematics::UrKinematics,
+        &dh_table::DhTable,
     ]
 }
 
@@ -172,6 +180,8 @@ pub fn write_all(folder: &Path, formats: &[&dyn Format], input: &ExportInput<'_>
     Ok(written)
 }
 
+#[cfg(test)]
+mod arm_tests;
 #[cfg(test)]
 mod golden_tests;
 #[cfg(test)]

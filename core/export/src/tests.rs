@@ -145,6 +145,7 @@ fn everything_written_reads_back_and_a_wrong_number_does_not() {
     let mut other = result.clone();
     other.hand_eye.as_mut().expect("a hand-eye").translation_m[0] += 1e-8;
     other.intrinsics.as_mut().expect("intrinsics").cx += 1e-8;
+    other.arm.as_mut().expect("an arm").joints[1].shift_mm.as_mut().expect("a shift")[0] += 1e-5;
     let other = ExportInput { result: &other, ..input };
     for ((format, file), path) in rendered.iter().zip(&written) {
         let read = ExportFile { name: file.name.clone(), text: fs::read_to_string(path).expect("text") };

@@ -10,7 +10,8 @@ use handeye_export::{CameraLink, ExportInput, ExportNames, ExportView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Pose, Target, Tip};
 use handeye_geometry::testing::python;
-use handeye_result::{CalibrationResult, IntrinsicsEstimate, Quality};
+use handeye_result::testing::golden_arm;
+use handeye_result::{ArmEstimate, CalibrationResult, IntrinsicsEstimate, Quality};
 use handeye_tests::{handeye_binary, workspace_root};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde_json::json;
@@ -20,7 +21,11 @@ const GOLDEN_M: [f64; 3] = [0.045, -0.032, 0.061];
 const GOLDEN_XYZW: [f64; 4] = [0.195832126, 0.036412615, 0.644503346, 0.738200065];
 
 fn result_of(links: &HandEye, distortion: Distortion) -> CalibrationResult {
-    let mut result = CalibrationResult::default();
+    let (chain, fit) = golden_arm();
+    // A standing camera's robot is on a table, with a tool.
+    let on_a_table = chain.clone().mounted(gimbal_lock(1.0, 0.3), golden());
+    let chain = if matches!(links, HandEye::EyeInHand { .. }) { chain } else { on_a_table };
+    let mut result = CalibrationResult { arm: ArmEstimate::new(&chain, &fit), ..CalibrationResult::default() };
     result.set_links(links, None, None);
     let k = Intrinsics { width: 1280, height: 720, fx: 912.4, fy: 911.8, cx: 640.7, cy: 361.2, distortion };
     result.intrinsics = Some(IntrinsicsEstimate::new(&k, None, false));
