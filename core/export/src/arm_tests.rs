@@ -35,7 +35,7 @@ fn with_arm(arm: &Arm, error: impl Fn(usize) -> f64) -> CalibrationResult {
         covariance: nalgebra::DMatrix::from_diagonal_element(12 + count, 12 + count, 1e-9),
         ..golden_arm().1
     };
-    CalibrationResult { arm: ArmEstimate::new(arm, &fit), ..golden() }
+    CalibrationResult { arm: ArmEstimate::new(arm, &fit, [0.0, 0.0, 0.1]), ..golden() }
 }
 
 fn text_of(format: &str, name: &str, result: &CalibrationResult) -> String {

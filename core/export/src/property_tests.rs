@@ -98,7 +98,7 @@ fn arms() -> impl Strategy<Value = ArmEstimate> {
     (errors, isometries(), isometries()).prop_map(|(values, mount, tool)| {
         let (chain, fit) = golden_arm();
         let fit = ArmFit { errors: ArmErrors::new(6, values).expect("so many"), ..fit };
-        ArmEstimate::new(&chain.mounted(mount, tool), &fit).expect("six joints")
+        ArmEstimate::new(&chain.mounted(mount, tool), &fit, [0.0, 0.0, 0.1]).expect("six joints")
     })
 }
 

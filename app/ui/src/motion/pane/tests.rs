@@ -218,7 +218,7 @@ fn numbers_follow_the_arm_until_a_person_edits_them_and_say_how_far_the_move_is(
 #[test]
 fn a_typed_tip_pose_is_corrected_for_the_errors_of_the_arm_unless_a_person_says_otherwise() {
     let mut pane = driven(sample::with_errors_of_the_arm());
-    assert!(pane.sees("really [mm]") && pane.sees("By the errors of the arm"), "{}", pane.text());
+    assert!(pane.sees("really [mm]") && pane.sees("By the errors of the arm"));
     pane.click("Tip pose in base");
     assert!(pane.sees("within 0.25 mm with it and 2.91 mm without"));
     let sent = pane.click("Move there");

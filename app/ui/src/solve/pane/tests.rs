@@ -67,7 +67,7 @@ fn what_a_tool_arrives_within_is_said_and_that_the_arm_is_the_limit_where_it_is(
     pane.model().view.goal = Goal(0.3e-3);
     pane.steps();
     assert!(pane.sees("A tool arrives within (95 %)") && pane.sees("2.91 mm") && pane.sees("0.25 mm"));
-    assert!(pane.sees("a tool of 100 mm"), "{}", pane.text());
+    assert!(pane.sees("a tool of 100 mm"));
     assert!(pane.sees("the arm is the limit: correct its commands"));
     pane.model().view.goal = Goal(0.22e-3);
     pane.steps();
