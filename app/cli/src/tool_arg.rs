@@ -18,7 +18,7 @@ fn tool(text: &str) -> Result<[f64; 3], String> {
     let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     let count = numbers.len();
     let place: [f64; 3] = numbers.try_into().map_err(|_other| format!("{count} numbers: give x,y,z in metres"))?;
-    match place.iter().find(|metres| !(-LONGEST_TOOL_M..=LONGEST_TOOL_M).contains(&**metres)) {
+    match place.iter().find(|metres| !(-LONGEST_TOOL_M..=LONGEST_TOOL_M).contains(*metres)) {
         Some(far) => Err(format!("{far} m: lengths are metres here; divide millimetres by 1000")),
         None => Ok(place),
     }

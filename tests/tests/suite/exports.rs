@@ -25,7 +25,8 @@ fn result_of(links: &HandEye, distortion: Distortion) -> CalibrationResult {
     // A standing camera's robot is on a table, with a tool.
     let on_a_table = chain.clone().mounted(gimbal_lock(1.0, 0.3), golden());
     let chain = if matches!(links, HandEye::EyeInHand { .. }) { chain } else { on_a_table };
-    let mut result = CalibrationResult { arm: ArmEstimate::new(&chain, &fit), ..CalibrationResult::default() };
+    let mut result =
+        CalibrationResult { arm: ArmEstimate::new(&chain, &fit, [0.0, 0.0, 0.1]), ..CalibrationResult::default() };
     result.set_links(links, None, None);
     let k = Intrinsics { width: 1280, height: 720, fx: 912.4, fy: 911.8, cx: 640.7, cy: 361.2, distortion };
     result.intrinsics = Some(IntrinsicsEstimate::new(&k, None, false));
