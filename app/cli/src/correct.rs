@@ -21,6 +21,9 @@ pub const EXAMPLES: &str = "Examples:
   handeye correct result.json reported.csv --from-reported --out real.csv
   my_planner | handeye correct result.json - --json -";
 
+/// What messages call the table that is read there.
+const STANDARD_INPUT: &str = "standard input";
+
 /// Options of `handeye correct`.
 #[derive(Debug, Args)]
 pub struct CorrectArgs {
@@ -90,13 +93,23 @@ pub fn run(args: &CorrectArgs) -> Result<(), Failure> {
     }
 }
 
+fn is_standard(args: &CorrectArgs) -> bool {
+    args.table == Path::new("-")
+}
+
 fn read(args: &CorrectArgs) -> Result<CorrectTable, Failure> {
-    let table = if args.table == Path::new("-") {
-        CorrectTable::of_reader(Path::new("standard input"), std::io::stdin().lock())
+    let table = if is_standard(args) {
+        CorrectTable::of_reader(Path::new(STANDARD_INPUT), std::io::stdin().lock())
     } else {
         CorrectTable::open(&args.table)
     };
     table.map_err(Failure::unusable)
+}
+
+/// An error of a row.
+fn at(args: &CorrectArgs, line: usize, error: impl std::fmt::Display) -> Failure {
+    let name = if is_standard(args) { Path::new(STANDARD_INPUT) } else { &args.table };
+    Failure::unusable(anyhow!("{}, row {line}: {error}", name.display()))
 }
 
 fn commands(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<Vec<Answer>, Failure> {
@@ -104,9 +117,7 @@ fn commands(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<Vec<Answer>,
     let mut answers = Vec::new();
     for wanted in read(args)?.wanted(corrected.arm.joint_count()).map_err(Failure::unusable)? {
         near = wanted.near_rad.unwrap_or(near);
-        let command = corrected
-            .command(&wanted.base_from_tip, &near)
-            .map_err(|error| Failure::unusable(anyhow!("{}, row {}: {error}", args.table.display(), wanted.line)))?;
+        let command = corrected.command(&wanted.base_from_tip, &near).map_err(|error| at(args, wanted.line, error))?;
         near.clone_from(&command.joints_rad);
         answers.push(Answer::new(command.joints_rad, &command.base_from_tip, command.error_95_m));
     }
@@ -116,9 +127,8 @@ fn commands(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<Vec<Answer>,
 fn actual(corrected: &CorrectedArm, args: &CorrectArgs) -> Result<Vec<Answer>, Failure> {
     let mut answers = Vec::new();
     for (line, joints_rad) in read(args)?.joint_values(corrected.arm.joint_count()).map_err(Failure::unusable)? {
-        let at = |error| Failure::unusable(anyhow!("{}, row {line}: {error}", args.table.display()));
-        let pose = corrected.actual(&joints_rad).map_err(at)?;
-        let error_95_m = corrected.error_95_m(&joints_rad).map_err(at)?;
+        let pose = corrected.actual(&joints_rad).map_err(|error| at(args, line, error))?;
+        let error_95_m = corrected.error_95_m(&joints_rad).map_err(|error| at(args, line, error))?;
         answers.push(Answer::new(joints_rad, &pose, error_95_m));
     }
     Ok(answers)
