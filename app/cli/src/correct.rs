@@ -19,7 +19,7 @@ use crate::{Failure, out};
 pub const EXAMPLES: &str = "Examples:
   handeye correct result.json wanted.csv --out commands.csv
   handeye correct result.json reported.csv --from-reported --out real.csv
-  my_planner | handeye correct result.json - --json -";
+  handeye correct result.json - --json -";
 
 /// What messages call the table that is read there.
 const STANDARD_INPUT: &str = "standard input";

@@ -4,9 +4,11 @@ use handeye_geometry::targets::observation::View;
 use handeye_simulate::session::{ArmError, Setup, session};
 
 use super::*;
+use crate::diagnose::findings::{Finding, FindingCode, FindingOptions};
+use crate::diagnose::{Calibration, calibrate_with};
 use crate::handeye::Mode;
 use crate::handeye::joint::camera_from_target;
-use crate::{Method, fit as calibrated};
+use crate::{Method, Options, fit as calibrated};
 
 /// What is off about the links of a usual arm, by another convention than the estimator's: `a`, `d` \[m\], `alpha`, zero \[rad\].
 const LINKS: [[f64; 4]; 6] = [
@@ -61,6 +63,30 @@ fn corrected_poses_predict_what_reported_ones_do_not() {
         let [before, after] = arm.heldout_px.expect("twenty views");
         assert!(after < before && !arm.contradicted, "{mode:?}: {before} → {after} px");
     }
+}
+
+#[test]
+fn the_error_of_a_camera_on_an_arm_counts_what_the_arm_is_off_and_more_views_are_not_asked_for() {
+    let goal_mm = 0.05;
+    let of = |arm_error| {
+        let observations = session(&with(Mode::EyeInHand, arm_error, 5)).observations(false);
+        let wanted = FindingOptions { goal_mm: Some(goal_mm) };
+        calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &CancelToken::default())
+            .expect("solves")
+    };
+    let said = |calibration: &Calibration| {
+        let goal = |finding: &&Finding| finding.code == FindingCode::GoalNotReached;
+        calibration.diagnosis().findings.iter().find(goal).map(ToString::to_string).unwrap_or_default()
+    };
+    let (off, exact) = (of(ArmError::Links(LINKS)), of(ArmError::None));
+    let (by_noise, stated) = (off.modelled_error_95_m().expect("joint"), off.tip_error_95_m().expect("joint"));
+    let apart = off.moved_by_arm_m().expect("the links are off");
+    assert!(stated >= apart && stated > by_noise, "{apart} {by_noise} {stated}");
+    let covariances = off.link_covariances().expect("joint");
+    assert!(covariances.hand_eye.trace() > off.hand_eye_covariance().expect("joint").trace());
+    assert!(said(&off).contains("errors of the arm"), "{}", said(&off));
+    assert_eq!(exact.moved_by_arm_m(), None);
+    assert!(!said(&exact).contains("errors of the arm"), "{}", said(&exact));
 }
 
 #[test]

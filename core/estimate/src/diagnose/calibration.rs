@@ -121,6 +121,16 @@ impl Calibration {
         Some(by_arm.map_or(by_poses, |by_arm| by_poses.max(by_arm)))
     }
 
+    /// How far the errors of the arm put the answer from where the camera really is on it, at a point where it saw the target, metres, where
+    /// that is most of the stated error: more views do not lower it.
+    pub fn moved_by_arm_m(&self) -> Option<f64> {
+        let ([hand_eye, _], law) = self.of_links_by_arm()?;
+        let point = &self.joint.as_ref()?.reference_point;
+        let (moved_m, error_m) = (hand_eye.moved_m(point), self.error_95_m(point)?);
+        let is_by_arm = hand_eye.error_95_m(law, point) >= error_m;
+        (is_by_arm && moved_m > 0.5 * error_m).then_some(moved_m)
+    }
+
     /// What the errors of the arm say of both links, and how their errors are distributed; `None` where its joints are not known, and
     /// where views left out contradict them. `None` of a camera beside the arm, too: an arm shifts all that it reports in a part of its
     /// workspace alike, and the camera with it, so that it meets what the camera sees there.

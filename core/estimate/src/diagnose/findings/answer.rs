@@ -193,6 +193,19 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     let (mm, deg) = (joint.noise.field_m * 1e3, joint.noise.field_rad.to_degrees());
+    let by_arm = joint.arm.as_ref().filter(|arm| !arm.contradicted).and_then(|arm| arm.heldout_px);
+    if let Some([without, with]) = by_arm.filter(|[without, with]| with < without) {
+        let text = text!(
+            "The robot's errors depend on where it stands: {mm} mm and {deg}° per axis at a typical distance from the middle of \
+             the session. The errors of its arm explain them: poses that are corrected by them bring views left out of the fit \
+             from {without} px to {with} px. Correct its commands by them, for which `handeye correct` makes the table.",
+            mm = shown(mm, 2),
+            deg = shown(deg, 3),
+            without = shown(without, 2),
+            with = shown(with, 2)
+        );
+        return Some(field_finding(text, (mm, deg), (without, with)));
+    }
     let (without, with) = (joint.heldout_links_rms_px?, joint.heldout_rms_px?);
     let text = text!(
         "The robot's errors depend on where it stands: {mm} mm and {deg}° per axis at a typical distance from the middle of \
@@ -217,9 +230,13 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
         ]),
         None => text,
     };
+    Some(field_finding(text, (mm, deg), (without, with)))
+}
+
+fn field_finding(text: Text, (mm, deg): (f64, f64), (without_px, with_px): (f64, f64)) -> Finding {
     let finding = Finding::new(FindingCode::RobotField, Severity::Advice, text);
     let finding = finding.with("field_sigma", mm, "mm").with("field_sigma_angle", deg, "°");
-    Some(finding.with("heldout_rms", without, "px").with("heldout_rms_corrected", with, "px"))
+    finding.with("heldout_rms", without_px, "px").with("heldout_rms_corrected", with_px, "px")
 }
 
 fn print_errors(calibration: &Calibration) -> Option<Finding> {
@@ -339,6 +356,14 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
         );
         finding(FindingCode::GoalNotReached, Severity::Advice, text)
     };
+    if let Some(moved_m) = calibration.moved_by_arm_m() {
+        let advice = text!(
+            "Most of it, {moved} mm, are errors of the arm, and more views do not lower it: correct the commands by them, for which \
+             `handeye correct` makes the table, or have the arm calibrated.",
+            moved = shown(moved_m * 1e3, 3)
+        );
+        return Some(not_reached(advice).with("moved_by_arm", moved_m * 1e3, "mm"));
+    }
     if calibration.stated != StatedUncertainty::AsModelled {
         return Some(not_reached(text!("More views do not help until what was found is corrected.")));
     }
