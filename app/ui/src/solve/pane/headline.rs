@@ -107,16 +107,13 @@ fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     ui.add(Label::new(RichText::new(meaning.in_language(language)).color(palette.weak)).wrap());
     let goal_mm = model.view.goal.0 * 1e3;
     let calibrated = quality.tip_error_95_mm.is_some_and(|error_mm| error_mm <= goal_mm);
-    if calibrated && as_it_is > goal_mm {
+    if as_it_is > goal_mm && (calibrated || solved.calibration.moved_by_arm_m().is_some()) {
         let advice = if corrected <= goal_mm {
-            tr!(
-                language,
-                "The calibration is good enough, and the arm is the limit: correct its commands, for which “handeye correct” makes the table."
-            )
+            tr!(language, "The arm is the limit: correct its commands, for which “handeye correct” makes the table.")
         } else {
             tr!(
                 language,
-                "The calibration is good enough, and the arm is the limit: captures with more different postures of the arm tell its \
+                "The arm is the limit: captures with more different postures of the arm tell its \
                  errors better."
             )
         };

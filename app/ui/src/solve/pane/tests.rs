@@ -68,13 +68,13 @@ fn what_a_tool_arrives_within_is_said_and_that_the_arm_is_the_limit_where_it_is(
     pane.steps();
     assert!(pane.sees("A tool arrives within (95 %)") && pane.sees("2.91 mm") && pane.sees("0.25 mm"));
     assert!(pane.sees("a tool of 100 mm"));
-    assert!(pane.sees("the arm is the limit: correct its commands"));
+    assert!(pane.sees("The arm is the limit: correct its commands"));
     pane.model().view.goal = Goal(0.22e-3);
     pane.steps();
-    assert!(pane.sees("the arm is the limit: captures with more"), "corrected commands do not reach it either");
+    assert!(pane.sees("The arm is the limit: captures with more"), "corrected commands do not reach it either");
     pane.model().view.goal = Goal(3e-3);
     pane.steps();
-    assert!(!pane.sees("the arm is the limit"));
+    assert!(!pane.sees("The arm is the limit"));
     assert!(!with(None, None).sees("A tool arrives"), "an arm that is not known promises nothing");
 }
 
