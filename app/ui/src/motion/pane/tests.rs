@@ -12,6 +12,7 @@ use handeye_workbench::model::{
     ArmDoubt, Axis, CellFacts, CellSource, Drivers, Home, Jog, JogFrame, JogStep, JointFacts, LinkState, Motion,
     MotionGoal, MotionId, Pane, Severity, Simulation,
 };
+use handeye_workbench::motion::correction::real_tip;
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
 use handeye_workbench::{connect, messages, motion};
@@ -222,7 +223,10 @@ fn a_typed_tip_pose_is_corrected_for_the_errors_of_the_arm_unless_a_person_says_
     pane.click("Tip pose in base");
     assert!(pane.sees("within 0.25 mm with it and 2.91 mm without"));
     let sent = pane.click("Move there");
-    assert!(matches!(&sent[..], [Command::Motion(motion::Command::MoveCorrected { .. })]), "{sent:?}");
+    let [Command::Motion(motion::Command::MoveCorrected { base_from_tip, .. })] = &sent[..] else { panic!("{sent:?}") };
+    let (real, _) = real_tip(pane.model()).expect("its errors are known");
+    let off_m = base_from_tip.distance_to(&real).0;
+    assert!(off_m < 2e-5, "what nobody typed is where the tip really is: {off_m} m off");
     pane.click("Correct for the errors of the arm");
     let sent = pane.click("Move there");
     assert!(matches!(&sent[..], [Command::Motion(motion::Command::Move { .. })]), "{sent:?}");

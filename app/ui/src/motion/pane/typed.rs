@@ -13,7 +13,7 @@ use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, MotionGoal, RobotState};
 use handeye_workbench::motion;
-use handeye_workbench::motion::correction::corrected_arm;
+use handeye_workbench::motion::correction::{corrected_arm, real_tip};
 use handeye_workbench::motion::way::Way;
 use handeye_workbench::tr;
 
@@ -59,8 +59,9 @@ impl Typed {
         let rounded = |value: f64| (value * 100.0).round() / 100.0;
         let shown = |i: usize| rounded(robot.joints_rad[i] * model.joint_kind(i).shown_per_si());
         self.joints = JointValues::from_fn(robot.joints_rad.len(), shown);
-        let [x, y, z]: [f64; 3] = robot.base_from_tip.translation().into();
-        let (roll, pitch, yaw) = robot.base_from_tip.rotation().euler_angles();
+        let base_from_tip = self.real_tip(model).unwrap_or(robot.base_from_tip);
+        let [x, y, z]: [f64; 3] = base_from_tip.translation().into();
+        let (roll, pitch, yaw) = base_from_tip.rotation().euler_angles();
         let mm = [x, y, z].map(|metres| rounded(metres * 1e3));
         let deg = [roll, pitch, yaw].map(|radians| rounded(radians.to_degrees()));
         self.tip = [mm[0], mm[1], mm[2], deg[0], deg[1], deg[2]];
@@ -72,11 +73,26 @@ impl Typed {
         self.is_edited &= self.cell == model.cells && robot.is_some_and(|it| it.joints_rad.len() == self.joints.len());
         self.cell = model.cells;
         // What was typed is done with once the arm is there.
-        self.is_edited &= !(self.is_sent && Way::to(&self.goal(model), model).is_some_and(|way| way.is_none()));
+        self.is_edited &= !(self.is_sent && self.way(model).is_some_and(|way| way.is_none()));
         self.is_sent &= self.is_edited;
         if let Some(robot) = robot.filter(|_| !self.is_edited) {
             self.fill(model, robot);
         }
+    }
+
+    /// Where the tip really is, where moves are corrected for that.
+    fn real_tip(&self, model: &Model) -> Option<Pose<Base, Tip>> {
+        self.is_corrected(model).then(|| real_tip(model)).flatten().map(|(real, _)| real)
+    }
+
+    fn is_corrected(&self, model: &Model) -> bool {
+        let expected = self.is_tip.then(|| expected_mm(model)).flatten();
+        expected.is_some_and(|(plain, corrected)| self.corrected.unwrap_or(corrected < plain))
+    }
+
+    fn way(&self, model: &Model) -> Option<Way> {
+        let to = |real: Pose<Base, Tip>| Way { tip: Some(real.distance_to(&self.base_from_tip())), joint: None };
+        self.real_tip(model).map(to).or_else(|| Way::to(&self.goal(model), model))
     }
 
     fn goal(&self, model: &Model) -> MotionGoal {
@@ -114,9 +130,8 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     if typed.is_tip {
         parts::hint_ui(ui, tr!(language, "Rotation: R = Rz(yaw) · Ry(pitch) · Rx(roll), as in URDF"));
     }
-    let is_corrected = typed.is_tip && corrected_ui(ui, model, &mut typed.corrected);
-    let goal = typed.goal(model);
-    let way = Way::to(&goal, model);
+    corrected_ui(ui, model, &mut typed);
+    let (goal, way) = (typed.goal(model), typed.way(model));
     let reported = match way {
         Some(_) if !typed.is_edited => text!("These are the numbers of where the arm is: type others"),
         Some(way) => text!("To there {way}", way = way.text(model)),
@@ -127,7 +142,7 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
         let reason = if typed.is_tip { blocked.tip } else { blocked.arm };
         if parts::gated_ui(ui, reason, Button::new(tr!(language, "Move there"))).clicked() {
             let what = if typed.is_tip { text!("typed tip pose") } else { text!("typed joint values") };
-            outbox.send(if is_corrected {
+            outbox.send(if typed.is_corrected(model) {
                 motion::Command::MoveCorrected { base_from_tip: typed.base_from_tip(), what }
             } else {
                 motion::Command::Move { goal, what }
@@ -142,17 +157,20 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
     parts::remember(ui, id, typed);
 }
 
+/// What a tool arrives within by the controller as it is and by corrected commands, millimetres, 95 %; `None` where the errors of this arm
+/// are not known.
+fn expected_mm(model: &Model) -> Option<(f64, f64)> {
+    let quality = &corrected_arm(model)?.0.result.quality;
+    quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm)
+}
+
 /// Whether the errors of the arm are corrected, where they are known.
-fn corrected_ui(ui: &mut Ui, model: &Model, wanted: &mut Option<bool>) -> bool {
+fn corrected_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
     let language = model.view.language;
-    let Some((solved, _)) = corrected_arm(model) else { return false };
-    let quality = &solved.result.quality;
-    let Some((plain, corrected)) = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm) else {
-        return false;
-    };
-    let mut is_corrected = wanted.unwrap_or(corrected < plain);
+    let Some((plain, corrected)) = expected_mm(model).filter(|_| typed.is_tip) else { return };
+    let mut is_corrected = typed.is_corrected(model);
     if ui.checkbox(&mut is_corrected, tr!(language, "Correct for the errors of the arm")).changed() {
-        *wanted = Some(is_corrected);
+        typed.corrected = Some(is_corrected);
     }
     let expected = text!(
         "A tool arrives within {corrected} mm with it and {plain} mm without, in 95 of 100 cases",
@@ -160,7 +178,6 @@ fn corrected_ui(ui: &mut Ui, model: &Model, wanted: &mut Option<bool>) -> bool {
         plain = format!("{plain:.2}")
     );
     parts::hint_ui(ui, &expected.in_language(language));
-    is_corrected
 }
 
 fn fields_ui(ui: &mut Ui, model: &Model, typed: &mut Typed) {
