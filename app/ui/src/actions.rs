@@ -396,6 +396,7 @@ mod tests {
             CommandKind::Motion(Motion::JogHeld),
             CommandKind::Motion(Motion::JogReleased),
             CommandKind::Motion(Motion::Move),
+            CommandKind::Motion(Motion::MoveCorrected),
             CommandKind::Motion(Motion::SetConfirmMoves),
             CommandKind::Motion(Motion::SetJog),
             CommandKind::Scene(Scene::SetView),

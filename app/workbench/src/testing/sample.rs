@@ -272,7 +272,8 @@ pub fn corrected_arm() -> CorrectedArm {
     let robot = connected().robot.expect("connected");
     let bare = ArmKind::Ur5Coppeliasim.arm();
     let there = *bare.forward(&robot.joints_rad).expect("six joints").isometry();
-    let arm = bare.mounted(robot.base_from_tip.isometry() * there.inverse(), Isometry3::identity());
+    let (foot, tool) = (bare.base_from_first, bare.flange_from_tip);
+    let arm = bare.mounted(robot.base_from_tip.isometry() * there.inverse() * foot, tool);
     let count = arm_parameters(6).len();
     let value = |(k, parameter): (usize, &ArmParameter)| {
         let size = if matches!(parameter.error, LinkError::ShiftX | LinkError::ShiftY) { 2e-4 } else { 2e-3 };
