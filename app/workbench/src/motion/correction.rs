@@ -21,11 +21,16 @@ pub fn corrected_arm(model: &Model) -> Option<(&Solved, &Arc<CorrectedArm>)> {
     (off_m <= FITS.0 && off_rad <= FITS.1).then_some((solved, arm))
 }
 
-/// Where the tip really is, and the distance that it is within with a probability of 95 %, metres.
-pub fn real_tip(model: &Model) -> Option<(Pose<Base, Tip>, f64)> {
+/// Where the tip really is.
+pub fn real_tip(model: &Model) -> Option<Pose<Base, Tip>> {
     let (_, arm) = corrected_arm(model)?;
-    let joints = &model.robot.as_ref()?.joints_rad;
-    Some((arm.actual(joints).ok()?, arm.error_95_m(joints).ok()?))
+    arm.actual(&model.robot.as_ref()?.joints_rad).ok()
+}
+
+/// The distance from [`real_tip`] that the tip is within with a probability of 95 %, metres.
+pub fn real_tip_error_95_m(model: &Model) -> Option<f64> {
+    let (_, arm) = corrected_arm(model)?;
+    arm.error_95_m(&model.robot.as_ref()?.joints_rad).ok()
 }
 
 /// By which arm a move is corrected, and where it begins.

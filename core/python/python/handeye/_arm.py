@@ -72,8 +72,8 @@ class Arm:
     target_covariance: Optional[Array]
     """Of target, (6, 6)."""
     reach_error_95_mm: Optional[float]
-    """How far from a point that the camera saw the tip of a tool of 100 mm arrives by the controller as it is: 95 % are below.
-    None where it cannot be stated."""
+    """How far from a point that the camera saw the tip of a tool arrives by the controller as it is: 95 % are below. The tool is
+    `tool_m` of a data set, or 100 mm along z of the tip. None where it cannot be stated."""
     reach_error_corrected_95_mm: Optional[float]
     """The same by corrected poses and commands."""
     heldout_px: Optional[Tuple[float, float]]

@@ -10,7 +10,7 @@ use crate::style::theme::{Palette, Tone};
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Motion, Pane, RotationFormat, Severity};
-use handeye_workbench::motion::correction::real_tip;
+use handeye_workbench::motion::correction::{real_tip, real_tip_error_95_m};
 use handeye_workbench::tr;
 use handeye_workbench::{messages, motion};
 
@@ -85,7 +85,7 @@ pub fn tip_ui(ui: &mut Ui, model: &Model) {
         });
     });
     parts::stated_in_ui(ui, "x y z [mm]", &numbers::translation_mm(pose), colour);
-    if let Some((real, within_m)) = real_tip(model) {
+    if let Some((real, within_m)) = real_tip(model).zip(real_tip_error_95_m(model)) {
         parts::stated_in_ui(ui, tr!(language, "really [mm]"), &numbers::translation_mm(&real), colour);
         let within = text!(
             "By the errors of the arm that the calibration found; within {mm} mm of that in 95 of 100 cases",

@@ -224,7 +224,7 @@ fn a_typed_tip_pose_is_corrected_for_the_errors_of_the_arm_unless_a_person_says_
     assert!(pane.sees("within 0.25 mm with it and 2.91 mm without"));
     let sent = pane.click("Move there");
     let [Command::Motion(motion::Command::MoveCorrected { base_from_tip, .. })] = &sent[..] else { panic!("{sent:?}") };
-    let (real, _) = real_tip(pane.model()).expect("its errors are known");
+    let real = real_tip(pane.model()).expect("its errors are known");
     let off_m = base_from_tip.distance_to(&real).0;
     assert!(off_m < 2e-5, "what nobody typed is where the tip really is: {off_m} m off");
     pane.click("Correct for the errors of the arm");

@@ -82,7 +82,7 @@ impl Typed {
 
     /// Where the tip really is, where moves are corrected for that.
     fn real_tip(&self, model: &Model) -> Option<Pose<Base, Tip>> {
-        self.is_corrected(model).then(|| real_tip(model)).flatten().map(|(real, _)| real)
+        self.is_corrected(model).then(|| real_tip(model)).flatten()
     }
 
     fn is_corrected(&self, model: &Model) -> bool {
