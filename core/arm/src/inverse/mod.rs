@@ -99,6 +99,17 @@ impl Arm {
         }
     }
 
+    /// The same without a search: in closed form, or by one descent from `near` on; `None` where that gives none. For many poses of which
+    /// some are out of reach, where [`Self::inverse`] takes a hundred times as long.
+    pub fn inverse_nearby(&self, base_from_tip: &Pose<Base, Tip>, near: &[f64]) -> Option<Vec<f64>> {
+        if self.ur.is_some() {
+            return self.inverse(base_from_tip, near).ok();
+        }
+        let is_usable =
+            near.len() == self.joint_count() && base_from_tip.is_finite() && near.iter().all(|q| q.is_finite());
+        if is_usable { search::nearby(self, base_from_tip.isometry(), near) } else { None }
+    }
+
     /// All configurations that put the tip at a pose, every joint in (−π, π] whatever its range; `None` for an arm that
     /// has no closed form. Empty when the pose is out of reach or not finite. Where the fourth and sixth axes are parallel,
     /// joint 6 is free, and one configuration stands for all.

@@ -76,6 +76,13 @@ pub(super) fn nearest(arm: &Arm, goal: &Isometry3<f64>, near: &[f64]) -> Result<
     })
 }
 
+/// See [`Arm::inverse_nearby`].
+pub(super) fn nearby(arm: &Arm, goal: &Isometry3<f64>, near: &[f64]) -> Option<Vec<f64>> {
+    let search = Search::new(arm, goal, near);
+    let end = search.descend(&search.near);
+    search.reached(&end).map(|found| search.values(&found))
+}
+
 /// Where a descent ended.
 struct End {
     /// In units of the search.

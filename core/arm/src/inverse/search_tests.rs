@@ -43,6 +43,31 @@ fn of_a_thousand_goals_in_reach_of_each_arm_five_at_most_are_missed_and_no_limit
 }
 
 #[test]
+fn a_goal_nearby_is_found_without_a_search_as_with_one_and_one_out_of_reach_is_not() {
+    for file in [UR5, PANDA, XARM6, XARM6_ON_TRACK] {
+        let arm = arm(file);
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let (mut found, mut same) = (0, 0);
+        for _ in 0..100 {
+            let near = draw(&mut rng, &arm);
+            let goal: Vec<f64> = near.iter().map(|q| q + rng.random_range(-0.2..0.2)).collect();
+            if arm.first_violation(&goal).is_some() {
+                continue;
+            }
+            let goal = arm.forward(&goal).expect("joints");
+            let Some(joints) = arm.inverse_nearby(&goal, &near) else { continue };
+            assert!(miss(&arm, &joints, &goal) < 3e-8, "{}", file.name);
+            found += 1;
+            same += usize::from(arm.inverse(&goal, &near).is_ok_and(|searched| searched == joints));
+        }
+        assert!(found > 40 && 10 * same >= 9 * found, "{}: {same} of {found}", file.name);
+        let far = Pose::from_isometry(Isometry3::translation(5.0, 0.0, 0.4));
+        assert_eq!(arm.inverse_nearby(&far, &draw(&mut rng, &arm)), None);
+        assert_eq!(arm.inverse_nearby(&far, &[0.0]), None);
+    }
+}
+
+#[test]
 fn a_goal_beyond_the_stretched_arm_is_answered_with_how_far_the_tip_stays_away() {
     let arm = arm(XARM6);
     let near = [0.0, 0.0, -1.0, 0.0, 1.0, 0.0];
