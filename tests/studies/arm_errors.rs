@@ -15,12 +15,12 @@ use std::process::ExitCode;
 
 use handeye_arm::{Arm, ArmKind};
 use handeye_estimate::corrected_arm::CorrectedArm;
-use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::diagnose::{Calibration, calibrate_with};
 use handeye_estimate::handeye::joint::ArmErrors;
 use handeye_estimate::handeye::{HandEye, Mode};
-use handeye_estimate::placement::{JointView, place_checked};
-use handeye_estimate::reach_error::{Seen, reach_errors};
-use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView};
+use handeye_estimate::placement::{ArmOfViews, JointView, place_checked};
+use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView, Options};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median;
@@ -320,7 +320,14 @@ fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touc
         camera: if free_lens { CameraKnowledge::NOTHING } else { CameraKnowledge::Fixed(camera()) },
         views: observed.collect(),
     };
-    let calibration = calibrate(&observations, Method::Joint, &CancelToken::default())?;
+    let of_views = ArmOfViews {
+        placement: placement.clone(),
+        tool_m: cell.tool.translation.vector.into(),
+        joints_rad: taken.iter().map(|taken| Some(taken.joints.to_vec())).collect(),
+    };
+    let wanted = FindingOptions::default().with_arm(Some(&of_views));
+    let calibration =
+        calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &CancelToken::default())?;
     let arm = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()).ok_or("no arm was estimated")?;
     // Random numbers of its own: what is touched does not depend on it.
     let true_camera =
@@ -337,15 +344,10 @@ fn session(cell: &Cell, views: usize, free_lens: bool, seed: u64) -> Result<Touc
     let space_m = (hand_eye.mount_from_camera().isometry() * board - true_camera * board).norm();
     let plain_tool = tool_by(cell, believed, &mut rng).ok_or("no tool")?;
     let corrected_tool = tool_by(cell, actual, &mut rng).ok_or("no tool")?;
-    let seen: Vec<Seen> = taken
-        .iter()
-        .zip(&calibration.views)
-        .filter_map(|(taken, view)| {
-            Some(Seen { joints_rad: taken.joints.to_vec(), camera_from_target: view.camera_from_target? })
-        })
-        .collect();
-    let reach = reach_errors(&corrected, arm, &hand_eye, &seen, &TARGET, &cell.tool.translation.vector);
-    let stated = reach.map_or([f64::NAN; 2], |reach| [reach.as_it_is_95_m, reach.corrected_95_m]);
+    let stated = calibration
+        .reach_errors()
+        .and_then(|reach| Some([reach.as_it_is_95_m, reach.corrected_95_m?]))
+        .unwrap_or([f64::NAN; 2]);
     let mut within = [0.0; 2];
     let (mut as_it_is, mut by_command, mut count) = (0.0, 0.0, 0.0);
     for _ in 0..TRIES {

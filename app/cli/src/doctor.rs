@@ -8,6 +8,7 @@ use handeye_estimate::diagnose::doctor::{Detail, diagnose};
 use handeye_estimate::diagnose::findings::FindingOptions;
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::{CalibrateError, Method, Options};
+use handeye_session::SessionObservations;
 
 use super::output::Output;
 use crate::{Failure, out, solve};
@@ -21,7 +22,7 @@ pub struct DoctorArgs {
     /// Write the diagnosis as JSON to this file; `-` for standard output instead of the report.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     json: Option<Output>,
-    /// The expected error to reach, millimetres (95 %).
+    /// The error to reach, millimetres (95 %), as for `handeye auto`.
     #[arg(long, value_name = "MM", help_heading = heading::ESTIMATE)]
     goal: Option<f64>,
     /// List every hypothesis that was tested, with what it explains.
@@ -32,8 +33,8 @@ pub struct DoctorArgs {
 /// Prints the diagnosis. A session that is ill is an answer, not a failure: the exit code is 0.
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
-    let observations = solve::read(&args.path, &cancel)?.seen.observations;
-    let wanted = FindingOptions::with_goal_mm(args.goal);
+    let SessionObservations { observations, arm, .. } = solve::read(&args.path, &cancel)?.seen;
+    let wanted = FindingOptions::with_goal_mm(args.goal).with_arm(arm.as_ref());
     let diagnosis = match calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel) {
         Ok(calibration) => calibration.into_diagnosis(),
         Err(error @ CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(Failure::failed(error)),

@@ -82,8 +82,8 @@ impl Facts {
         let seen_now = model.board_seen_s.is_some_and(|seen_s| model.now_s - seen_s < STALE_AFTER_S);
         let captured = model.observed.values().flatten().any(|observed| observed.corners.is_some());
         let current = model.solve.current();
-        let expected_error_m =
-            current.and_then(|solved| solved.result.quality.tip_error_95_mm).map(|error_mm| error_mm * 1e-3);
+        let promised = current.and_then(|solved| solved.promised(model.view.goal.0));
+        let expected_error_m = promised.map(|promised| promised.error_m);
         Self {
             connected,
             lost: !connected && model.frame.is_some(),

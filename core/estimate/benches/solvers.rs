@@ -7,14 +7,19 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use handeye_estimate::diagnose::calibrate;
+use handeye_arm::ArmKind;
+use handeye_estimate::corrected_arm::CorrectedArm;
+use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::diagnose::{calibrate, calibrate_with};
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::intrinsics::{Options, SeenView, solve};
-use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView};
+use handeye_estimate::placement::{ArmOfViews, JointView, place};
+use handeye_estimate::reach_error::USUAL_TOOL_M;
+use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView, Options as SolveOptions};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::testing::BOARD;
-use handeye_simulate::session::{REALISTIC, trial};
+use handeye_simulate::session::{REALISTIC, Setup, session, trial};
 use nalgebra::{Point3, Vector2};
 
 const SIZE: (u32, u32) = (640, 480);
@@ -99,5 +104,49 @@ fn whole(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, projection, intrinsics, whole);
+/// The same with an arm whose joints are known: its errors, what a tool arrives within, and a corrected command.
+fn with_arm(c: &mut Criterion) {
+    let mut group = c.benchmark_group("calibrate_with_arm");
+    group.sample_size(10).measurement_time(Duration::from_secs(5));
+    let near = [0.0, -1.2, 1.6, -1.9, -1.5, 0.0];
+    for (name, free_lens) in [("known_camera", false), ("unknown_camera", true)] {
+        for count in [10, 100, 1_000] {
+            let setup = Setup { joints: true, noise: REALISTIC, ..Setup::new(Mode::EyeInHand, count, 5) };
+            let session = session(&setup);
+            let observations = session.observations(free_lens);
+            let arm = ArmKind::Ur5.arm();
+            let inverse = |pose| arm.inverse(&pose, &near).expect("within reach");
+            let joints_rad: Vec<Vec<f64>> = session.views.iter().map(|view| inverse(view.base_from_tip)).collect();
+            let views: Vec<JointView<'_>> = session
+                .views
+                .iter()
+                .zip(&joints_rad)
+                .map(|(view, joints_rad)| JointView { base_from_tip: view.base_from_tip, joints_rad })
+                .collect();
+            let placement = place(&arm, &views).expect("an arm");
+            let tool_m = [0.0, 0.0, USUAL_TOOL_M];
+            let of_views = ArmOfViews { placement, tool_m, joints_rad: joints_rad.into_iter().map(Some).collect() };
+            let wanted = FindingOptions::default().with_arm(Some(&of_views));
+            let cancel = CancelToken::default();
+            let solve = |observations: &Observations| {
+                calibrate_with(observations, Method::Joint, SolveOptions::default(), &wanted, &cancel).expect("solves")
+            };
+            group.throughput(Throughput::Elements(count as u64));
+            group.bench_with_input(BenchmarkId::new(name, count), &observations, |b, observations| {
+                b.iter(|| solve(black_box(observations)));
+            });
+            if (count, free_lens) == (10, false) {
+                let calibration = solve(&observations);
+                let errors = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()).expect("known joints");
+                let corrected = CorrectedArm::new(of_views.placement.arm.clone(), errors).expect("its own");
+                let wanted = session.views[3].base_from_tip;
+                group.bench_function("command", |b| {
+                    b.iter(|| corrected.command(black_box(&wanted), &near).expect("within reach"));
+                });
+            }
+        }
+    }
+}
+
+criterion_group!(benches, projection, intrinsics, whole, with_arm);
 criterion_main!(benches);

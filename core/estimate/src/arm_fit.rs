@@ -1,13 +1,19 @@
 //! The arm's own errors within a calibration: what they are, and the transforms that go with them.
 
 use nalgebra::{DMatrix, Matrix6};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-use crate::handeye::joint::{self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample};
+use crate::handeye::joint::{
+    self, ArmErrors, Free, JointProblem, JointSolution, Noise, PoseDependentError, SIZE_SIGMA, SmallSample,
+};
 use crate::handeye::{HandEye, HandEyeError, determined};
+use crate::resolution;
 use crate::stated_uncertainty::Alternative;
 use crate::uncertainty::quality;
+use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::progress::Work;
 use handeye_geometry::se3;
+use handeye_geometry::targets::bent::BoardShape;
 
 /// The errors of the robot's arm as the views show them, and the calibration by the tip poses that they make. Both transforms are
 /// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
@@ -17,6 +23,8 @@ pub struct ArmFit {
     pub errors: ArmErrors,
     /// Both rigid links, by corrected tip poses.
     pub hand_eye: HandEye,
+    /// What was estimated beside them.
+    pub beside: BesideArm,
     /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right
     /// perturbations. The uncertainty of the lens and of everything else that is estimated is in it.
     pub covariance: DMatrix<f64>,
@@ -26,8 +34,23 @@ pub struct ArmFit {
     pub noise: Noise,
     /// RMS of 2-D corner residuals on views left out \[px\], by reported poses and by corrected ones; `None` with too few views.
     pub heldout_px: Option<[f64; 2]>,
-    /// Whether views left out are predicted worse by corrected poses than by reported ones, by more than chance.
+    /// Whether views left out contradict the errors: they are predicted worse by corrected poses than by reported ones, by more than
+    /// chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected poses,
+    /// which the uncertainty of the errors says.
     pub contradicted: bool,
+}
+
+/// What was estimated beside the errors of an arm and both links.
+#[derive(Debug, Clone)]
+pub struct BesideArm {
+    /// The lens, estimated or as given.
+    pub intrinsics: Intrinsics,
+    /// Shape of the target, estimated or as given.
+    pub shape: BoardShape,
+    /// Errors that depend on where the robot stands and that its arm does not explain; `None` when they were not estimated.
+    pub field: Option<PoseDependentError>,
+    /// What of all that was free.
+    pub free: Free,
 }
 
 /// Gain of minus twice the log-likelihood, integrated over what is known of sizes beforehand, from which the size of the target is free:
@@ -69,6 +92,13 @@ fn with_shown_size<'a>(
     Ok(by_size.map_or((*stated, fit), |by_size| (sized, by_size)))
 }
 
+/// How many times as large as is expected the RMS of the residuals of so many views is by chance, once in twenty: what a pose is off has
+/// six numbers, and they make up most of it.
+fn by_chance(views: usize) -> f64 {
+    let numbers = 6.0 * views as f64;
+    ChiSquared::new(numbers).map_or(f64::INFINITY, |law| (law.inverse_cdf(0.95) / numbers).sqrt())
+}
+
 /// The errors of the arm by the views of a joint estimate; `None` where these do not know its joints, where the noise levels are
 /// given, and where there is no answer with them.
 pub(crate) fn arm_fit(
@@ -85,17 +115,29 @@ pub(crate) fn arm_fit(
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
     let heldout = quality::compared((problem, solution), (&with, &fit), work.cancel)?;
+    let contradicted = match heldout.filter(|heldout| heldout.is_worse) {
+        None => false,
+        Some(heldout) => {
+            let expected = determined(joint::prediction::expected_residuals(&with, &fit, *work))?;
+            expected.is_none_or(|expected| {
+                let by_chance_px = expected.prediction_px * by_chance(with.views.len());
+                heldout.after_px > by_chance_px.max(resolution::FINE_PX)
+            })
+        }
+    };
+    let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, field: fit.field.clone(), free: fit.free };
     let count = errors.values().len();
     let first = fit.covariance.nrows() - count;
     let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
     Ok(Some(ArmFit {
         errors,
         hand_eye: fit.hand_eye,
+        beside,
         covariance: fit.covariance.select_rows(&kept).select_columns(&kept),
         small_sample: fit.small_sample,
         noise: fit.noise,
         heldout_px: heldout.map(|heldout| [heldout.before_px, heldout.after_px]),
-        contradicted: heldout.is_some_and(|heldout| heldout.is_worse),
+        contradicted,
     }))
 }
 

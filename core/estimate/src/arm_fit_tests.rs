@@ -68,7 +68,7 @@ fn corrected_poses_predict_what_reported_ones_do_not() {
 #[test]
 fn the_error_of_a_camera_on_an_arm_counts_what_the_arm_is_off_and_more_views_are_not_asked_for() {
     let cancel = CancelToken::default();
-    let wanted = FindingOptions { goal_mm: Some(0.05) };
+    let wanted = FindingOptions::with_goal_mm(Some(0.05));
     let of = |arm_error| {
         let observations = session(&with(Mode::EyeInHand, arm_error, 5)).observations(false);
         // Nothing else that was found is counted.

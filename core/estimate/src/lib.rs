@@ -107,7 +107,7 @@ mod wrong_corners;
 
 use nalgebra::{DMatrix, Matrix5, Matrix6, Point3, Vector2};
 
-pub use crate::arm_fit::ArmFit;
+pub use crate::arm_fit::{ArmFit, BesideArm};
 use crate::handeye::closed_form::{self, ClosedFormSolution};
 use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::{
@@ -344,6 +344,11 @@ impl Fit {
         let of_lens = joint.covariance.fixed_view::<2, 2>(LENS_AT, LENS_AT);
         let along = Vector2::new(camera.intrinsics.fx.recip(), -camera.intrinsics.fy.recip());
         Some(along.dot(&(of_lens * along)).max(0.0).sqrt())
+    }
+
+    /// The errors of the robot's arm, where they are known and views left out do not contradict them.
+    pub fn arm(&self) -> Option<&ArmFit> {
+        self.joint.as_ref()?.arm.as_ref().filter(|arm| !arm.contradicted)
     }
 
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, m and rad; `None` for a closed form.

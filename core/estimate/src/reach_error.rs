@@ -13,9 +13,13 @@
 //! little elsewhere is counted to first order. The draws are the same in every run.
 //!
 //! # Degenerate cases
-//! Touches out of reach of the arm are left out; with fewer than a quarter of them left nothing is stated.
+//! Touches out of reach of the arm are left out; with fewer than a quarter of them left nothing is stated. Where the controller counts
+//! with another chain than the one that is known, the errors are those beside what it reports, and no commands are corrected by them:
+//! the error with corrected commands is not stated then.
 
-use nalgebra::{Cholesky, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{
+    Cholesky, DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, UnitQuaternion, Vector3, Vector6,
+};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::arm_fit::ArmFit;
@@ -38,14 +42,18 @@ const PIVOTS: usize = 8;
 const TILT_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Share of errors within what is stated.
 const LEVEL: f64 = 0.95;
+/// Step of differences: metres and radians, of functions that turn over lengths of a metre.
+const STEP: f64 = 1e-6;
 /// Of the draws: the same in every run.
 const SEED: u64 = 0x72_6561_6368;
+/// Of the touches.
+const TOUCH_SEED: u64 = 0x74_6f75_6368;
 
 /// Length of a tool that nobody has named, along z of the tip, metres.
 pub const USUAL_TOOL_M: f64 = 0.1;
 
 /// A view of the session.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// Joint values as reported, radians.
     pub joints_rad: Vec<f64>,
@@ -58,11 +66,38 @@ pub struct Seen {
 pub struct ReachErrors {
     /// By reported poses, the transform that goes with them, and commands as they are.
     pub as_it_is_95_m: f64,
-    /// By corrected poses and commands.
-    pub corrected_95_m: f64,
+    /// By corrected poses and commands; `None` where no commands are corrected.
+    pub corrected_95_m: Option<f64>,
+    /// The part of the first that no view lowers: what the arm is off by its most probable errors, and does not repeat.
+    pub as_it_is_least_95_m: f64,
+    /// The part of the other that no view lowers: what the arm does not repeat, at the view and at the touch.
+    pub repeatability_95_m: f64,
+}
+
+impl ReachErrors {
+    /// Of an answer that something else moves as far, metres.
+    #[must_use]
+    pub fn moved_by(self, moved_m: f64) -> Self {
+        Self {
+            as_it_is_95_m: self.as_it_is_95_m + moved_m,
+            corrected_95_m: self.corrected_95_m.map(|corrected_m| corrected_m + moved_m),
+            ..self
+        }
+    }
+
+    /// The larger of both, number by number.
+    fn worse(self, other: Self) -> Self {
+        Self {
+            as_it_is_95_m: self.as_it_is_95_m.max(other.as_it_is_95_m),
+            corrected_95_m: self.corrected_95_m.zip(other.corrected_95_m).map(|(a, b)| a.max(b)),
+            as_it_is_least_95_m: self.as_it_is_least_95_m.max(other.as_it_is_least_95_m),
+            repeatability_95_m: self.repeatability_95_m.max(other.repeatability_95_m),
+        }
+    }
 }
 
 /// One way of going about it: by reported poses, or by corrected ones.
+#[derive(Debug, Clone)]
 struct Way {
     hand_eye: HandEye,
     /// The arm as the way takes it to be: without errors where it is by reported poses.
@@ -100,62 +135,176 @@ impl At {
     }
 }
 
-/// The errors of reach of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the
-/// tool is in the frame of the tip, metres. `None` where too few touches are in reach.
-pub fn reach_errors(
-    arm: &CorrectedArm,
-    fit: &ArmFit,
-    answer: &HandEye,
-    views: &[Seen],
-    target: &TargetSpec,
-    tool: &Vector3<f64>,
-) -> Option<ReachErrors> {
-    let as_it_is = CorrectedArm { errors: ArmErrors::none(fit.errors.joint_count()), ..arm.clone() };
-    let axis = mean_axis(&arm.arm, views)?;
-    let ways = [Way { hand_eye: *answer, arm: as_it_is, axis }, Way { hand_eye: fit.hand_eye, arm: arm.clone(), axis }];
-    let mut random = Draw::new(SEED);
-    let planned = planned(views, target, &mut random);
-    let turns: Vec<UnitQuaternion<f64>> =
-        (0..PIVOTS).map(|_| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5))).collect();
-    let draws = Draws::new(fit, &mut random)?;
-    let mut stated = [0.0; 2];
-    for (stated, way) in stated.iter_mut().zip(&ways) {
-        let touches: Vec<Touch> = planned.iter().filter_map(|plan| way.touch(views, plan, tool)).collect();
-        if 4 * touches.len() < TOUCHES {
-            return None;
-        }
-        let pivots = way.pivots(&touches[0], &turns, views, tool);
-        let mut distances: Vec<f64> = Vec::with_capacity(DRAWS * touches.len());
-        for draw in &draws.0 {
-            let found = way.tool_by(&pivots, &draw.errors, tool)?;
-            distances.extend(touches.iter().map(|touch| Way::miss(touch, draw, tool, &found).norm()));
-        }
-        distances.sort_by(f64::total_cmp);
-        *stated = distances[((distances.len() as f64 * LEVEL) as usize).min(distances.len() - 1)];
-    }
-    Some(ReachErrors { as_it_is_95_m: stated[0], corrected_95_m: stated[1] })
+/// How near a tool arrives by a calibration of an arm that is known, wherever the camera sees.
+#[derive(Debug, Clone)]
+pub struct Reach {
+    as_it_is: Way,
+    corrected: Way,
+    views: Vec<Seen>,
+    tool: Vector3<f64>,
+    /// Turns about one point by which the tool is found.
+    turns: Vec<UnitQuaternion<f64>>,
+    /// Arms and cameras that the data allow.
+    possible: Vec<Possible>,
+    /// The most probable of them, which repeats no better than any.
+    repeated: Vec<Possible>,
+    /// Whether commands are corrected.
+    is_corrected: bool,
+    target: TargetSpec,
 }
 
-/// Which point of the target is touched after which view, and how the tool is turned against the target.
+/// Which points are touched, from which view, and how the tool is turned against the target.
 struct Plan {
     view: usize,
-    point: Point3<f64>,
+    in_camera: Point3<f64>,
     turn: UnitQuaternion<f64>,
 }
 
-fn planned(views: &[Seen], target: &TargetSpec, random: &mut Draw) -> Vec<Plan> {
-    let points = target.points();
-    let plan = |k: usize| {
-        let azimuth = random.even() * std::f64::consts::TAU;
-        let tilt = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * (TILT_RAD * random.even().sqrt());
-        let about = Vector3::z() * random.even() * std::f64::consts::TAU;
-        Plan {
-            view: k * views.len() / TOUCHES,
-            point: points[random.below(points.len())],
-            turn: UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(about),
+impl Reach {
+    /// Of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the tool is in the frame
+    /// of the tip, metres, and `is_corrected` whether commands can be corrected, as is so where the reported poses are those of the
+    /// chain. `None` without views, and for a covariance that is none.
+    pub fn new(
+        (arm, fit): (&CorrectedArm, &ArmFit),
+        answer: &HandEye,
+        views: Vec<Seen>,
+        target: &TargetSpec,
+        tool: &Vector3<f64>,
+        is_corrected: bool,
+    ) -> Option<Self> {
+        let as_it_is = CorrectedArm { errors: ArmErrors::none(fit.errors.joint_count()), ..arm.clone() };
+        let axis = mean_axis(&arm.arm, &views)?;
+        let mut random = Draw::new(SEED);
+        let turn = |random: &mut Draw| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5));
+        let turns = (0..PIVOTS).map(|_| turn(&mut random)).collect();
+        let possible = possible(fit, &mut random)?;
+        let best = |one: &Possible| Possible { errors: fit.errors.clone(), hand_eye: fit.hand_eye, ..one.clone() };
+        Some(Self {
+            as_it_is: Way { hand_eye: *answer, arm: as_it_is, axis },
+            corrected: Way { hand_eye: fit.hand_eye, arm: arm.clone(), axis },
+            views,
+            tool: *tool,
+            turns,
+            repeated: possible.iter().map(best).collect(),
+            possible,
+            is_corrected,
+            target: *target,
+        })
+    }
+
+    /// At points of the target where it was seen; `None` where too few touches are in reach.
+    pub fn at_target(&self) -> Option<ReachErrors> {
+        let points = self.target.points();
+        let seen = |view: usize, random: &mut Draw| {
+            self.views[view].camera_from_target.isometry() * points[random.below(points.len())]
+        };
+        if points.is_empty() { None } else { self.errors(seen) }
+    }
+
+    /// At points in the coordinates of a camera beside the arm, metres: the largest of the errors of those that are in reach. `None` where
+    /// none is, and with a camera on the arm, from whose views a point of the camera is in as many places.
+    pub fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
+        let points = in_camera.iter().filter(|_| self.stands_still());
+        points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
+    }
+
+    /// Whether the camera is beside the arm.
+    pub fn stands_still(&self) -> bool {
+        self.corrected.hand_eye.mode() == Mode::EyeToHand
+    }
+
+    /// Length of the tool, metres.
+    pub fn tool_length_m(&self) -> f64 {
+        self.tool.norm()
+    }
+
+    fn errors(&self, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Option<ReachErrors> {
+        let planned = self.planned(point);
+        let as_it_is = self.touches(&self.as_it_is, &planned)?;
+        let corrected = self.touches(&self.corrected, &planned)?;
+        let corrected_95_m = self.quantile(&self.corrected, &corrected, &self.possible)?;
+        Some(ReachErrors {
+            as_it_is_95_m: self.quantile(&self.as_it_is, &as_it_is, &self.possible)?,
+            corrected_95_m: self.is_corrected.then_some(corrected_95_m),
+            as_it_is_least_95_m: self.quantile(&self.as_it_is, &as_it_is, &self.repeated)?,
+            repeatability_95_m: self.quantile(&self.corrected, &corrected, &self.repeated)?,
+        })
+    }
+
+    /// How the miss of a touch by corrected commands turns with what is not known: the mean over touches of `Jᵀ J`, with `J` the
+    /// derivatives of the vector from the point to the tip of the tool by `[mount_from_camera (6), errors of the arm]`, metres and
+    /// radians. Of touches at the target, or at points in camera coordinates. `None` where too few touches are in reach.
+    pub fn weight(&self, in_camera: Option<&[Point3<f64>]>) -> Option<DMatrix<f64>> {
+        let target = self.target.points();
+        if in_camera.map_or(target.is_empty(), <[Point3<f64>]>::is_empty) {
+            return None;
         }
-    };
-    if views.is_empty() || points.is_empty() { Vec::new() } else { (0..TOUCHES).map(plan).collect() }
+        let planned = self.planned(|view, random| match in_camera {
+            Some(points) => points[random.below(points.len())],
+            None => self.views[view].camera_from_target.isometry() * target[random.below(target.len())],
+        });
+        let way = &self.corrected;
+        let touches = self.touches(way, &planned)?;
+        let pivots = way.pivots(&touches[0], &self.turns, &self.views, &self.tool);
+        let best =
+            Possible { at_view: Isometry3::identity(), at_touch: Isometry3::identity(), ..self.repeated[0].clone() };
+        let misses = |truth: &Possible| -> Option<DVector<f64>> {
+            let found = way.tool_by(&pivots, &truth.errors, &self.tool)?;
+            let each = touches.iter().flat_map(|touch| {
+                let miss: [f64; 3] = Way::miss(touch, truth, &self.tool, &found).into();
+                miss
+            });
+            Some(DVector::from_iterator(3 * touches.len(), each))
+        };
+        let (at_best, arm) = (misses(&best)?, best.errors.values().len());
+        let columns: Option<Vec<DVector<f64>>> = (0..6 + arm)
+            .map(|k| {
+                let mut there = best.clone();
+                if k < 6 {
+                    let mut step = Vector6::zeros();
+                    step[k] = STEP;
+                    let (mount, anchor) = (there.hand_eye.mount_from_camera(), there.hand_eye.anchor_from_target());
+                    there.hand_eye = HandEye::new(there.hand_eye.mode(), mount.perturbed(&step), anchor);
+                } else {
+                    there.errors.values_mut()[k - 6] += STEP;
+                }
+                Some((misses(&there)? - &at_best) / STEP)
+            })
+            .collect();
+        let by_unknowns = DMatrix::from_columns(&columns?);
+        Some(by_unknowns.tr_mul(&by_unknowns) / touches.len() as f64)
+    }
+
+    fn planned(&self, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Vec<Plan> {
+        let mut random = Draw::new(TOUCH_SEED);
+        let plan = |k: usize| {
+            let azimuth = random.even() * std::f64::consts::TAU;
+            let tilt = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * (TILT_RAD * random.even().sqrt());
+            let about = Vector3::z() * random.even() * std::f64::consts::TAU;
+            let view = k * self.views.len() / TOUCHES;
+            let in_camera = point(view, &mut random);
+            let turn = UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(about);
+            Plan { view, in_camera, turn }
+        };
+        (0..TOUCHES).map(plan).collect()
+    }
+
+    fn touches(&self, way: &Way, planned: &[Plan]) -> Option<Vec<Touch>> {
+        let touches: Vec<Touch> = planned.iter().filter_map(|plan| way.touch(&self.views, plan, &self.tool)).collect();
+        (4 * touches.len() >= TOUCHES).then_some(touches)
+    }
+
+    /// The quantile of the distances by a way where the truth is one of these.
+    fn quantile(&self, way: &Way, touches: &[Touch], truths: &[Possible]) -> Option<f64> {
+        let pivots = way.pivots(&touches[0], &self.turns, &self.views, &self.tool);
+        let mut distances: Vec<f64> = Vec::with_capacity(truths.len() * touches.len());
+        for truth in truths {
+            let found = way.tool_by(&pivots, &truth.errors, &self.tool)?;
+            distances.extend(touches.iter().map(|touch| Way::miss(touch, truth, &self.tool, &found).norm()));
+        }
+        distances.sort_by(f64::total_cmp);
+        Some(distances[((distances.len() as f64 * LEVEL) as usize).min(distances.len() - 1)])
+    }
 }
 
 impl Way {
@@ -170,7 +319,7 @@ impl Way {
     fn touch(&self, views: &[Seen], plan: &Plan, tool: &Vector3<f64>) -> Option<Touch> {
         let seen = &views[plan.view];
         let view = At::new(&self.arm.arm, &seen.joints_rad)?;
-        let in_camera = seen.camera_from_target.isometry() * plan.point;
+        let in_camera = plan.in_camera;
         let base_from_tip = view.tip(&self.arm.errors);
         let base_from_camera = Self::camera(&self.hand_eye, &base_from_tip);
         let along = match self.hand_eye.mode() {
@@ -244,6 +393,7 @@ impl Way {
 }
 
 /// An arm and a camera that the data allow.
+#[derive(Debug, Clone)]
 struct Possible {
     errors: ArmErrors,
     hand_eye: HandEye,
@@ -252,39 +402,36 @@ struct Possible {
     at_touch: Isometry3<f64>,
 }
 
-struct Draws(Vec<Possible>);
-
-impl Draws {
-    fn new(fit: &ArmFit, random: &mut Draw) -> Option<Self> {
-        let root = Cholesky::new(fit.covariance.clone())?.l();
-        let count = fit.covariance.nrows();
-        // As good as infinite.
-        let freedom = fit.small_sample.degrees_of_freedom.min(1e4);
-        let law = ChiSquared::new(freedom).ok()?;
-        let mut draws = Vec::with_capacity(DRAWS);
-        for _ in 0..DRAWS {
-            let unexplained = |random: &mut Draw| {
-                let sigma = |i: usize| if i < 3 { fit.noise.robot_m } else { fit.noise.robot_rad };
-                se3::exp(&Vector6::from_fn(|i, _| sigma(i) * random.normal()))
-            };
-            let (at_view, at_touch) = (unexplained(random), unexplained(random));
-            let step = &root * DVector::from_fn(count, |_, _| random.normal());
-            let step = step * (freedom / law.inverse_cdf(random.even())).sqrt();
-            let perturb = |at: usize| -> Vector6<f64> { step.fixed_rows::<6>(at).into_owned() };
-            let values = fit.errors.values().iter().zip(step.rows(12, count - 12).iter()).map(|(a, b)| a + b).collect();
-            draws.push(Possible {
-                errors: ArmErrors::new(fit.errors.joint_count(), values)?,
-                hand_eye: HandEye::new(
-                    fit.hand_eye.mode(),
-                    fit.hand_eye.mount_from_camera().perturbed(&perturb(0)),
-                    fit.hand_eye.anchor_from_target().perturbed(&perturb(6)),
-                ),
-                at_view,
-                at_touch,
-            });
-        }
-        Some(Self(draws))
+/// Drawn from what a fit leaves open; `None` for a covariance that is none.
+fn possible(fit: &ArmFit, random: &mut Draw) -> Option<Vec<Possible>> {
+    let root = Cholesky::new(fit.covariance.clone())?.l();
+    let count = fit.covariance.nrows();
+    // As good as infinite.
+    let freedom = fit.small_sample.degrees_of_freedom.min(1e4);
+    let law = ChiSquared::new(freedom).ok()?;
+    let mut drawn = Vec::with_capacity(DRAWS);
+    for _ in 0..DRAWS {
+        let unexplained = |random: &mut Draw| {
+            let sigma = |i: usize| if i < 3 { fit.noise.robot_m } else { fit.noise.robot_rad };
+            se3::exp(&Vector6::from_fn(|i, _| sigma(i) * random.normal()))
+        };
+        let (at_view, at_touch) = (unexplained(random), unexplained(random));
+        let step = &root * DVector::from_fn(count, |_, _| random.normal());
+        let step = step * (freedom / law.inverse_cdf(random.even())).sqrt();
+        let perturb = |at: usize| -> Vector6<f64> { step.fixed_rows::<6>(at).into_owned() };
+        let values = fit.errors.values().iter().zip(step.rows(12, count - 12).iter()).map(|(a, b)| a + b).collect();
+        drawn.push(Possible {
+            errors: ArmErrors::new(fit.errors.joint_count(), values)?,
+            hand_eye: HandEye::new(
+                fit.hand_eye.mode(),
+                fit.hand_eye.mount_from_camera().perturbed(&perturb(0)),
+                fit.hand_eye.anchor_from_target().perturbed(&perturb(6)),
+            ),
+            at_view,
+            at_touch,
+        });
     }
+    Some(drawn)
 }
 
 /// The mean z axis of the tip over the views, in the base.

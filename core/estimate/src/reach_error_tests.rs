@@ -22,9 +22,14 @@ fn solved(mode: Mode, arm_error: ArmError) -> (Session, Fit, Vec<Seen>) {
 }
 
 fn stated(session: &Session, found: &Fit, seen: &[Seen]) -> Option<ReachErrors> {
+    reach(session, found, seen)?.at_target()
+}
+
+fn reach(session: &Session, found: &Fit, seen: &[Seen]) -> Option<Reach> {
     let fit = found.joint.as_ref()?.arm.as_ref()?;
     let arm = CorrectedArm::new(ArmKind::Ur5.arm(), fit)?;
-    reach_errors(&arm, fit, found.hand_eye.as_ref()?, seen, &session.target, &(Vector3::z() * USUAL_TOOL_M))
+    let tool = Vector3::z() * USUAL_TOOL_M;
+    Reach::new((&arm, fit), found.hand_eye.as_ref()?, seen.to_vec(), &session.target, &tool, true)
 }
 
 #[test]
@@ -37,9 +42,59 @@ fn an_arm_whose_links_are_off_arrives_nearer_by_corrected_commands_and_an_exact_
         let (session, found, seen) = solved(mode, ArmError::None);
         let exact = stated(&session, &found, &seen).expect("an arm in reach");
         println!("{mode:?}: {off:?}, exact {exact:?}");
-        assert!(off.corrected_95_m < off.as_it_is_95_m, "{mode:?}: {off:?}");
+        let corrected_95_m = off.corrected_95_m.expect("its own chain");
+        assert!(corrected_95_m < off.as_it_is_95_m, "{mode:?}: {off:?}");
+        assert!(off.repeatability_95_m < corrected_95_m, "{mode:?}: {off:?}");
         assert!(exact.as_it_is_95_m < 0.5 * off.as_it_is_95_m, "{mode:?}: {exact:?}");
         assert_eq!(stated(&session, &found, &seen), Some(exact), "the same in every run");
+    }
+}
+
+#[test]
+fn at_points_it_is_that_of_the_worst_and_the_arm_repeats_as_its_noise_says() {
+    let (session, found, seen) = solved(Mode::EyeInHand, ArmError::None);
+    let reach = reach(&session, &found, &seen).expect("an arm in reach");
+    let at = |z: f64| reach.at_points(&[Point3::new(0.0, 0.0, z)]).expect("in reach");
+    let middle = session.target.centre().coords.norm();
+    let distance = seen.iter().map(|seen| seen.camera_from_target.translation().norm()).sum::<f64>() / 20.0 - middle;
+    let (near, far) = (at(distance), at(distance + 0.1));
+    let both = [distance, distance + 0.1].map(|z| Point3::new(0.0, 0.0, z));
+    let worst = reach.at_points(&both).expect("in reach");
+    assert_eq!(worst.as_it_is_95_m, near.as_it_is_95_m.max(far.as_it_is_95_m));
+    // Two positions with 0.02 mm an axis, and orientations over 0.1 m of tool and the way to the board: 2.8 σ of a 3-D vector.
+    let noise = found.joint.as_ref().and_then(|joint| joint.arm.as_ref()).expect("an arm").noise;
+    let sigma_m = (2.0 * noise.robot_m.powi(2) + (noise.robot_rad * distance).powi(2)).sqrt();
+    assert!((2.0 * sigma_m..3.5 * sigma_m).contains(&near.repeatability_95_m), "{} {sigma_m}", near.repeatability_95_m);
+}
+
+#[test]
+fn the_weight_says_how_far_small_errors_move_a_touch() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (session, found, seen) = solved(mode, ArmError::None);
+        let reach = reach(&session, &found, &seen).expect("an arm in reach");
+        let weight = reach.weight(None).expect("in reach");
+        let arm = reach.repeated[0].errors.values().len();
+        // Half a millimetre here, some hundredths of a degree there.
+        let step = DVector::from_fn(6 + arm, |k, _| 3e-4 * (1.3 * k as f64 + 1.0).sin());
+        let expected_m = (step.transpose() * &weight * &step)[(0, 0)].sqrt();
+        let mut truth =
+            Possible { at_view: Isometry3::identity(), at_touch: Isometry3::identity(), ..reach.repeated[0].clone() };
+        truth.errors.values_mut().iter_mut().zip(step.rows(6, arm).iter()).for_each(|(value, step)| *value += step);
+        let mount = truth.hand_eye.mount_from_camera().perturbed(&step.fixed_rows::<6>(0).into_owned());
+        truth.hand_eye = HandEye::new(mode, mount, truth.hand_eye.anchor_from_target());
+        let target = session.target.points();
+        let planned = reach.planned(|view, random| {
+            reach.views[view].camera_from_target.isometry() * target[random.below(target.len())]
+        });
+        let way = &reach.corrected;
+        let touches = reach.touches(way, &planned).expect("in reach");
+        let pivots = way.pivots(&touches[0], &reach.turns, &reach.views, &reach.tool);
+        let tool = way.tool_by(&pivots, &truth.errors, &reach.tool).expect("a tool");
+        let squares: f64 =
+            touches.iter().map(|touch| Way::miss(touch, &truth, &reach.tool, &tool).norm_squared()).sum();
+        let moved_m = (squares / touches.len() as f64).sqrt();
+        assert!((moved_m / expected_m - 1.0).abs() < 0.02, "{mode:?}: {moved_m} m, by the weight {expected_m} m");
+        assert!(moved_m > 1e-4, "{moved_m}");
     }
 }
 

@@ -86,9 +86,7 @@ struct Hand {
 impl Arm {
     /// The joint values nearest to `seed` that put the tip there, within the ranges of the joints.
     pub fn reach(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Option<JointValues> {
-        let arm_from_connection =
-            self.world_from_arm.inverse() * base_from_tip.isometry() * self.connection_from_tip.inverse();
-        let found = self.chain.inverse(&Pose::from_isometry(arm_from_connection), seed).ok()?;
+        let found = self.chain.inverse(&self.arm_from_connection(base_from_tip), seed).ok()?;
         JointValues::try_from(&found[..]).ok()
     }
 
@@ -96,6 +94,20 @@ impl Arm {
     pub fn tip(&self, joints: &[f64]) -> Option<Pose<Base, Tip>> {
         let arm_from_connection = *self.chain.forward(joints).ok()?.isometry();
         Some(Pose::from_isometry(self.world_from_arm * arm_from_connection * self.connection_from_tip))
+    }
+
+    fn arm_from_connection(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Base, Tip> {
+        let world_from_connection = base_from_tip.isometry() * self.connection_from_tip.inverse();
+        Pose::from_isometry(self.world_from_arm.inverse() * world_from_connection)
+    }
+
+    /// Its joints in a view from there, as [`View::tip_from_joints`](handeye_geometry::targets::observation::View::tip_from_joints),
+    /// where it gets there from `seed` on; empty where it does not.
+    pub fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Vec<Isometry3<f64>> {
+        let joints = self.chain.inverse_nearby(&self.arm_from_connection(base_from_tip), seed);
+        let Some(joints) = joints else { return Vec::new() };
+        let arm_from_tip = Pose::from_isometry(self.world_from_arm.inverse() * base_from_tip.isometry());
+        self.chain.tip_from_joints(&arm_from_tip, &joints).unwrap_or_default()
     }
 
     /// What it fills with these joint values; `None` for values that are not those of the arm.

@@ -40,7 +40,7 @@ pub fn calibrate(
     }
     let (mut result, sigmas, other_chain) = run(py, progress, |work| {
         let observed = &observations.observed;
-        let wanted = FindingOptions::with_goal_mm(goal_mm);
+        let wanted = FindingOptions::with_goal_mm(goal_mm).with_arm(observations.arm());
         let calibration = calibrate_with(observed, method, options, &wanted, work)?;
         let (result, other_chain) = document(observations, &calibration, method, options);
         Ok((result, calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad)), other_chain))
@@ -60,7 +60,7 @@ pub fn diagnose(
     let observations = observations.get();
     run(py, progress, |work| {
         let observed = &observations.observed;
-        let wanted = FindingOptions::with_goal_mm(goal_mm);
+        let wanted = FindingOptions::with_goal_mm(goal_mm).with_arm(observations.arm());
         let diagnosis = match calibrate_with(observed, Method::Joint, Options::default(), &wanted, work) {
             Ok(calibration) => calibration.into_diagnosis(),
             Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(HandEyeError::Cancelled.into()),
@@ -92,8 +92,8 @@ fn document(
     }
     let mut result = CalibrationResult::of(calibration, env!("CARGO_PKG_VERSION"), None, reported);
     result.findings = calibration.diagnosis().findings.iter().map(Finding::to_record).collect();
-    let other_chain = observations.arm.as_ref().and_then(|arm| arm.as_ref().ok()).and_then(|arm| {
-        let is_its_own = result.state_arm(calibration, arm, &observations.observed.target);
+    let other_chain = observations.arm().and_then(|arm| {
+        let is_its_own = result.state_arm(calibration, arm);
         (!is_its_own).then(|| arm.placement.rms_m())
     });
     (result, other_chain)

@@ -95,6 +95,13 @@ pub struct Observations {
 /// Corners of a view: their numbers, all of the target where they are left out, and pixels u, v.
 type CornerArrays = (Option<Vec<u8>>, Vec<u8>);
 
+impl Observations {
+    /// The arm, where it is known and belongs to the poses.
+    pub fn arm(&self) -> Option<&ArmOfViews> {
+        self.arm.as_ref()?.as_ref().ok()
+    }
+}
+
 #[pymethods]
 impl Observations {
     /// `description` is JSON; arrays are bytes, a 4 × 4 matrix for every view, numbers of corners as int64,

@@ -38,7 +38,8 @@ pub struct ArmEstimate {
     pub region_scale: f64,
     /// RMS of 2-D corner residuals on views left out, pixels; `None` with too few of them.
     pub heldout_px: Option<HeldOutByArm>,
-    /// Whether views left out are predicted worse by corrected poses, by more than chance: then do not correct.
+    /// Whether views left out contradict the errors, being predicted worse by corrected poses than chance and the model explain: then
+    /// do not correct.
     pub contradicted: bool,
 }
 

@@ -33,7 +33,8 @@ pub struct StepRecord {
     pub joints: Option<Vec<f64>>,
     /// Why this pose.
     pub why: String,
-    /// The error before it by the noise alone, 95 %, millimetres; `None` for the first turns.
+    /// The error before it, 95 %, millimetres: of a measured point by the noise alone, or of a tool by corrected commands; `None` for
+    /// the first turns.
     pub before_mm: Option<f64>,
     /// The error that it was to lead to.
     pub promised_mm: Option<f64>,

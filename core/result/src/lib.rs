@@ -238,10 +238,10 @@ pub struct Quality {
     /// Expected error where the tool works: 95 % of the errors are below, millimetres.
     pub tip_error_95_mm: Option<f64>,
     /// Distance between a point that the camera saw and the tip of a tool that is sent there by the controller as it is: 95 % are
-    /// below, millimetres; `None` where the arm is not known.
+    /// below, millimetres; `None` where the arm is not known, does not get there, or is contradicted by views left out.
     #[serde(default)]
     pub reach_error_95_mm: Option<f64>,
-    /// The same by corrected poses and commands.
+    /// The same by corrected poses and commands; `None`, too, where the controller counts with another chain.
     #[serde(default)]
     pub reach_error_corrected_95_mm: Option<f64>,
     /// Estimated noise of the robot's positions, millimetres per axis.

@@ -2,22 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::{
     ArmEstimate, BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, MethodRecord,
     OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate,
     TargetSizeEstimate, ViewRecord, ViewRecordStatus,
 };
-use handeye_arm::Arm;
-use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::handeye::joint::{PoseDependentError, PrintErrors, ShownDistortion};
 use handeye_estimate::placement::ArmOfViews;
-use handeye_estimate::reach_error::{ReachErrors, Seen, reach_errors};
 use handeye_estimate::uncertainty::overdispersion::Evidence;
 use handeye_estimate::{
-    ArmFit, CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
+    CameraFit, DepthsInFit, JointFit, Method, MethodResult, Options, ShapeEstimate, ViewResult, ViewStatus,
 };
 use handeye_geometry::targets::TargetSpec;
 
@@ -44,6 +41,7 @@ impl CalibrationResult {
         options: BTreeMap<String, serde_json::Value>,
     ) -> Self {
         let noise = calibration.joint.as_ref().map(|joint| joint.noise);
+        let reach = calibration.reach_errors();
         let camera_alone = calibration.camera_fit.as_ref().filter(|_| calibration.hand_eye.is_none());
         let mut result = Self {
             intrinsics: calibration.camera.map(|c| IntrinsicsEstimate::new(&c.intrinsics, c.sigma_px, c.fixed)),
@@ -52,8 +50,8 @@ impl CalibrationResult {
                 sigma_px: noise.map(|n| n.corner_px).or_else(|| camera_alone.and_then(|fit| fit.noise_px)),
                 heldout_rms_px: calibration.joint.as_ref().and_then(|joint| joint.heldout_links_rms_px),
                 tip_error_95_mm: calibration.tip_error_95_m().map(|m| m * 1e3),
-                reach_error_95_mm: None,
-                reach_error_corrected_95_mm: None,
+                reach_error_95_mm: reach.map(|reach| reach.as_it_is_95_m * 1e3),
+                reach_error_corrected_95_mm: reach.and_then(|reach| reach.corrected_95_m).map(|m| m * 1e3),
                 robot_sigma_mm: noise.map(|n| n.robot_m * 1e3),
                 robot_sigma_deg: noise.map(|n| n.robot_rad.to_degrees()),
             },
@@ -80,41 +78,17 @@ impl CalibrationResult {
         result
     }
 
-    /// States what a calibration found of the errors of an arm, and how near a tool arrives with it; nothing where it found none.
-    /// `of_views` is the arm in its views, and `target` what they show.
+    /// States what a calibration found of the errors of an arm; nothing where it found none. `of_views` is the arm in its views.
     ///
     /// False where the reported poses are not those of the arm's chain, see [`handeye_estimate::placement::Placement::arm_of_poses`]: errors that are found beside
-    /// them are none of the arm, and nothing is stated.
+    /// them are none of the chain, and no command is corrected by them.
     #[must_use]
-    pub fn state_arm(&mut self, calibration: &Calibration, of_views: &ArmOfViews, target: &TargetSpec) -> bool {
+    pub fn state_arm(&mut self, calibration: &Calibration, of_views: &ArmOfViews) -> bool {
         let Some(errors) = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()) else { return true };
-        let ArmOfViews { placement, tool_m, joints_rad } = of_views;
-        let Some(arm) = placement.arm_of_poses() else { return false };
-        self.arm = ArmEstimate::new(arm, errors, *tool_m);
-        // What views left out contradict is not promised.
-        let tool = Vector3::from(*tool_m);
-        let reach = reach(calibration, arm, errors, joints_rad, (target, &tool)).filter(|_| !errors.contradicted);
-        self.quality.reach_error_95_mm = reach.map(|reach| reach.as_it_is_95_m * 1e3);
-        self.quality.reach_error_corrected_95_mm = reach.map(|reach| reach.corrected_95_m * 1e3);
+        let Some(arm) = of_views.placement.arm_of_poses() else { return false };
+        self.arm = ArmEstimate::new(arm, errors, of_views.tool_m);
         true
     }
-}
-
-/// How near a tool arrives; `None` where the error of the calibration cannot be stated either.
-fn reach(
-    calibration: &Calibration,
-    arm: &Arm,
-    errors: &ArmFit,
-    joints_rad: &[Option<Vec<f64>>],
-    (target, tool): (&TargetSpec, &Vector3<f64>),
-) -> Option<ReachErrors> {
-    calibration.tip_error_95_m()?;
-    let arm = CorrectedArm::new(arm.clone(), errors)?;
-    let seen = calibration.views.iter().zip(joints_rad).filter_map(|(view, joints_rad)| {
-        let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
-        Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })
-    });
-    reach_errors(&arm, errors, &calibration.hand_eye?, &seen.collect::<Vec<_>>(), target, tool)
 }
 
 fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {

@@ -9,11 +9,12 @@ use super::{
     TargetSizeEstimate, TruthComparison, VerificationSummary, ViewRecord, ViewRecordStatus,
 };
 use handeye_arm::{Arm, ArmKind};
-use handeye_estimate::ArmFit;
 use handeye_estimate::handeye::HandEye;
-use handeye_estimate::handeye::joint::{ArmErrors, Noise, SmallSample, arm_parameters};
+use handeye_estimate::handeye::joint::{ArmErrors, Free, Noise, SmallSample, arm_parameters};
+use handeye_estimate::{ArmFit, BesideArm};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::targets::bent::BoardShape;
 
 /// Calibration that the exports of other programs are compared with: tip to camera, 1280×720, `plumb_bob`.
 pub const GOLDEN_TRANSLATION_M: [f64; 3] = [0.045, -0.032, 0.061];
@@ -163,6 +164,12 @@ pub fn golden_arm() -> (Arm, ArmFit) {
     let fit = ArmFit {
         errors,
         hand_eye: HandEye::EyeInHand { tip_from_camera: golden_pose(), base_from_target },
+        beside: BesideArm {
+            intrinsics: Intrinsics::pinhole(640, 480, 600.0),
+            shape: BoardShape::default(),
+            field: None,
+            free: Free { arm: true, ..Free::default() },
+        },
         covariance: DMatrix::from_diagonal_element(12 + count, 12 + count, 1e-9),
         small_sample: SmallSample { degrees_of_freedom: 30.0, scale: 1.01, ..SmallSample::KNOWN },
         noise: Noise {

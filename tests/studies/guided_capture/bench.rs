@@ -80,7 +80,7 @@ impl Bench {
     pub fn new(cell: GuidedCell, seed: u64) -> Self {
         let truth = cell.truth();
         let first_tip = cell.base_from_tip();
-        let centre = truth.camera_from_target(&first_tip).isometry() * BOARD.centre();
+        let centre = truth.camera_from_target(&first_tip.into()).isometry() * BOARD.centre();
         let weight = weight_about(&centre, &BOARD);
         let all: Vec<usize> = (0..BOARD.len()).collect();
         let range = ViewRange::about([centre.coords.norm()].into_iter()).expect("it is in front of the camera");
@@ -99,10 +99,10 @@ impl Bench {
             if !cell.robot.arm.is_free(&joints, &cell.robot.around, cell.robot.clearance_m) {
                 continue;
             }
-            let Some(view) = truth.expected(&base_from_tip, &all) else { continue };
+            let Some(view) = truth.expected(&base_from_tip.into(), &all) else { continue };
             pool.push(Reachable { joints, base_from_tip, view });
         }
-        let first = truth.expected(&first_tip, &all).expect("it is in view");
+        let first = truth.expected(&first_tip.into(), &all).expect("it is in view");
         Self { cell, seed, truth, weight, pool, first }
     }
 
@@ -183,7 +183,11 @@ impl Bench {
         let all: Vec<usize> = (0..BOARD.len()).collect();
         let visited = cell.observations.views.iter().zip(&run.times_s).map(|(view, &time_s)| {
             let base_from_tip = view.base_from_tip.expect("a robot");
-            Visit { base_from_tip, view: self.truth.expected(&base_from_tip, &all).expect("it was seen"), time_s }
+            Visit {
+                base_from_tip,
+                view: self.truth.expected(&base_from_tip.into(), &all).expect("it was seen"),
+                time_s,
+            }
         });
         let visits: Vec<Visit> = visited.collect();
         // What it saw itself, not the same places seen once more.
@@ -258,7 +262,7 @@ impl Bench {
         for base_from_tip in poses {
             let seen = self.is_seen(&base_from_tip);
             let joints = cell.robot.arm.reach(&base_from_tip, &at);
-            if let (true, Some(joints), Some(view)) = (seen, joints, self.truth.expected(&base_from_tip, &all)) {
+            if let (true, Some(joints), Some(view)) = (seen, joints, self.truth.expected(&base_from_tip.into(), &all)) {
                 time_s += cell.robot.travel_s(&at, &joints) + DWELL_S;
                 at = joints;
                 visits.push(Visit { base_from_tip, view, time_s });
@@ -269,7 +273,7 @@ impl Bench {
 
     /// Whether all corners are in the image.
     fn is_seen(&self, base_from_tip: &Pose<Base, Tip>) -> bool {
-        let (intrinsics, view) = (self.truth.intrinsics(), self.truth.camera_from_target(base_from_tip));
+        let (intrinsics, view) = (self.truth.intrinsics(), self.truth.camera_from_target(&(*base_from_tip).into()));
         let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
         let is_inside = |point: &Point3<f64>| {
             let px = intrinsics.project(&(view.isometry() * point));

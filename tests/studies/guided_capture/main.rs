@@ -159,7 +159,7 @@ fn looks(arm: CellArm, mode: Mode, sessions: u64) {
         let calibration = cell.calibrate();
         let truth = cell.truth();
         let tip = cell.base_from_tip();
-        let seen = truth.camera_from_target(&tip);
+        let seen = truth.camera_from_target(&tip.into());
         let known = cell.known(calibration.as_ref(), 0.0);
         let mut guide = HandGuide::new(GuidedOptions { goal_m: 0.0, ..GuidedOptions::default() });
         let next = guide.next(&known, &seen, truth.intrinsics(), &CancelToken::default());

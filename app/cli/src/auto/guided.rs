@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use handeye_dataset::taught_poses::Goal;
-use handeye_estimate::diagnose::{Calibration, calibrate};
-use handeye_estimate::{Method, Observations};
+use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::diagnose::{Calibration, calibrate_with};
+use handeye_estimate::{Method, Observations, Options};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::Sight;
 use handeye_plan::guided::choose::{Proposal, Robot};
 use handeye_plan::guided::{Ending, Guide, Known, Next};
-use handeye_session::CaptureId;
+use handeye_session::{CaptureId, SessionObservations};
 
 use super::super::Failure;
 use super::super::towards_board::TowardsBoard;
@@ -153,9 +154,11 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     /// What the captures give, with what speaks against it.
     fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
         let document = self.sequence.session.document();
-        let observations = document.observations(self.image_size, |id| self.sights.get(&id).cloned()).observations;
+        let seen = document.observations(self.image_size, |id| self.sights.get(&id).cloned());
+        let SessionObservations { observations, arm, .. } = seen;
         let cancel: &CancelToken = self.sequence.cancel;
-        let calibration = calibrate(&observations, Method::Joint, cancel).ok();
+        let wanted = FindingOptions::default().with_arm(arm.as_ref());
+        let calibration = calibrate_with(&observations, Method::Joint, Options::default(), &wanted, cancel).ok();
         self.check_cancelled()?;
         Ok((observations, calibration))
     }

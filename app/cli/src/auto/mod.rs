@@ -93,7 +93,8 @@ pub struct AutoArgs {
 /// What guided capture is asked for.
 #[derive(Debug, Args)]
 struct GuidedArgs {
-    /// Expected error (95 %) to be reached, millimetres; 0.3 if not given.
+    /// Error (95 %) to be reached, millimetres: what a tool arrives within where the arm is known, else that of a measured
+    /// point; 0.3 if not given.
     #[arg(long, value_name = "MM", value_parser = positive, help_heading = heading::GUIDED)]
     goal: Option<f64>,
     /// Captures at the most; 40 if not given.

@@ -1,6 +1,7 @@
 //! The button that begins, and what is under way.
 
 use egui::{Button, RichText, Spinner, Ui, Vec2};
+use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_plan::guided::{CHECKS, Guide};
 
 use crate::shell::reasons::immovable;
@@ -66,8 +67,9 @@ fn hindered(model: &Model) -> Option<&'static str> {
 
 /// Whether there is more to reach: no captures yet, or an answer that is not below the goal.
 pub fn is_wanted(model: &Model) -> bool {
-    let error_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
-    model.document().captures.is_empty() || error_mm.is_none_or(|error_mm| error_mm > model.view.goal.0 * 1e3)
+    let goal_m = model.view.goal.0;
+    let promised = model.solve.solved.as_ref().and_then(|solved| solved.promised(goal_m));
+    model.document().captures.is_empty() || promised.is_none_or(|promised| promised.error_m > goal_m)
 }
 
 /// Why it cannot begin.
@@ -161,19 +163,43 @@ pub fn under_way(model: &Model, sequence: &PoseSequence, guided: &GuidedProgress
 /// The error beside the goal, and what is left; nothing before there is an error.
 pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
     let language = model.view.language;
-    let goal = format!("{:.3}", guide.options().goal_m * 1e3);
-    let at_board_mm = model.solve.solved.as_ref().and_then(|solved| solved.result.quality.tip_error_95_mm);
-    let over_box = model.tip_box.judged.filter(|_| model.tip_box.chosen.is_some());
-    let error = match (over_box, at_board_mm) {
-        (Some((_, over)), _) => text!(
-            "Expected error over the box {error} mm (95 %), goal {goal} mm",
-            error = format!("{:.3}", over.worst_m * 1e3),
+    let goal_m = guide.options().goal_m;
+    let Some(solved) = &model.solve.solved else { return };
+    let in_box = model.tip_box.chosen.is_some();
+    let promised = if in_box {
+        let point = model.tip_box.judged.map(|(_, over)| over.worst_m);
+        let judged =
+            guide.judged().filter(|judged| judged.tool_box.is_some() && judged.tool_box == guide.options().tool_box);
+        let of_tool = judged.map(|judged| judged.promised).filter(|promised| promised.of != Promise::Point);
+        of_tool.or_else(|| Promised::of(goal_m, None, None, point))
+    } else {
+        solved.promised(goal_m)
+    };
+    let Some(promised) = promised else { return };
+    let (error, goal) = (format!("{:.3}", promised.error_m * 1e3), format!("{:.3}", goal_m * 1e3));
+    let error = match (promised.of, in_box) {
+        (Promise::Point, true) => {
+            text!("Expected error over the box {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
+        }
+        (Promise::Point, false) => {
+            text!("Expected error {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
+        }
+        (Promise::Reach, true) => {
+            text!("In the box a tool arrives within {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
+        }
+        (Promise::Reach, false) => {
+            text!("A tool arrives within {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
+        }
+        (Promise::ReachCorrected, true) => text!(
+            "In the box a tool arrives within {error} mm with corrected commands (95 %), goal {goal} mm",
+            error = error,
             goal = goal
         ),
-        (None, Some(error_mm)) => {
-            text!("Expected error {error} mm (95 %), goal {goal} mm", error = format!("{error_mm:.3}"), goal = goal)
-        }
-        (None, None) => return,
+        (Promise::ReachCorrected, false) => text!(
+            "A tool arrives within {error} mm with corrected commands (95 %), goal {goal} mm",
+            error = error,
+            goal = goal
+        ),
     };
     let reported = std::iter::once(error).chain(left).map(|text| text.in_language(language));
     ui.label(reported.collect::<Vec<_>>().join(" · "));

@@ -1,6 +1,8 @@
 use std::sync::Arc;
 
 use handeye_dataset::taught_poses::TaughtPose;
+use handeye_estimate::diagnose::{Promise, Promised};
+use handeye_plan::guided::design::Part;
 use handeye_plan::guided::{Ending, GuidedOptions, Why};
 
 use super::section::{begin_ui, progress_ui};
@@ -43,7 +45,7 @@ fn under_way(waits: Waits, ending: Option<Ending>) -> Model {
     let guided = GuidedProgress {
         waits,
         ending,
-        why: Some(Why::Gain { from_m: 8e-4, to_m: 5e-4, rotation_part: 0.9 }),
+        why: Some(Why::Gain { from_m: 8e-4, to_m: 5e-4, part: Part::Rotation }),
         ..GuidedProgress::new(GuidedOptions::default(), 90.0)
     };
     model.sequence = Some(PoseSequence {
@@ -130,7 +132,10 @@ fn what_is_under_way_and_why_stands_in_the_pane() {
     let why = StopOutcome::Skipped(Text::verbatim("the pendant is in manual mode"));
     refused.sequence.as_mut().expect("one").outcomes = vec![why];
     assert!(self::pane(refused).sees("The pose before was left out: the pendant is in manual mode"));
-    let checking = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
+    let checking = under_way(
+        Waits::Nothing,
+        Some(Ending::GoalReached { promised: Promised { error_m: 3e-4, least_m: 0.0, of: Promise::Point } }),
+    );
     assert!(self::pane(checking).sees("Check 1 of 3"));
 }
 
@@ -150,7 +155,10 @@ fn the_error_over_a_box_that_was_chosen_stands_beside_the_goal() {
 
 #[test]
 fn how_it_ended_is_said_in_the_language_of_the_window_and_it_can_begin_again() {
-    let mut model = under_way(Waits::Nothing, Some(Ending::GoalReached { error_m: 3e-4 }));
+    let mut model = under_way(
+        Waits::Nothing,
+        Some(Ending::GoalReached { promised: Promised { error_m: 3e-4, least_m: 0.0, of: Promise::Point } }),
+    );
     model.sequence_runs = false;
     let ended = pane(model.clone());
     assert!(ended.sees("The goal is reached: the expected error is 0.300 mm"));

@@ -8,6 +8,7 @@ use crate::testing::sample;
 use crate::text::{Language, Text};
 use crate::worker::fake::FakeCell;
 use crate::{capture, guided, motion, taught};
+use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_plan::guided::Ending;
 
 const MANUAL: &str = "The robot refuses: the pendant is in manual mode";
@@ -101,7 +102,10 @@ fn poses_that_check_the_answer_are_gone_on_with_as_the_others_are() {
     let sequence = app.cx.model.sequence.as_mut().expect("a sequence");
     sequence.purpose = Some(CapturePurpose::Verify);
     let guided = sequence.guided.as_deref_mut().expect("guided");
-    (guided.ending, guided.waits) = (Some(Ending::GoalReached { error_m: 3e-4 }), Waits::Nothing);
+    (guided.ending, guided.waits) = (
+        Some(Ending::GoalReached { promised: Promised { error_m: 3e-4, least_m: 0.0, of: Promise::Point } }),
+        Waits::Nothing,
+    );
     app.apply(motion::Command::Stop);
     assert!(!app.model().sequence_runs);
     assert!(app.model().sequence.as_ref().is_some_and(PoseSequence::can_continue));

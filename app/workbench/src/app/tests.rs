@@ -1,12 +1,14 @@
 use std::time::{Duration, Instant};
 
 use handeye_arm::JointValues;
+use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::frames::Pose;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::Corner;
 use handeye_plan::guided::by_hand::{HandGuide, HandNext, Wanted};
 use handeye_plan::guided::choose::{Plan, Proposal};
+use handeye_plan::guided::design::Part;
 use handeye_plan::guided::{Ending, GuidedOptions, Known, Next, Why};
 use handeye_session::{CaptureId, Role};
 
@@ -275,10 +277,10 @@ pub(super) fn choose(app: &mut App) {
         joints: Some([0.1; 6].into()),
         travel_s: 1.0,
         error_ratio: 0.9,
-        rotation_part: 0.5,
+        part: Part::Position,
     };
     let plan = Plan { proposals: vec![proposal], best_ratio: 0.9, candidates: 9 };
-    let why = Why::Gain { from_m: 1e-3, to_m: 9e-4, rotation_part: 0.5 };
+    let why = Why::Gain { from_m: 1e-3, to_m: 9e-4, part: Part::Position };
     let step = ChosenStep::Next(Box::new(Next::Go { plan, why }));
     let guide = guided.guide.clone();
     let chosen_at = app.cx.model.robot.as_ref().expect("connected").joints_rad;
@@ -406,7 +408,9 @@ fn nobody_is_led_any_longer_once_the_arm_goes_by_itself_or_is_another_one() {
 #[test]
 fn only_a_capture_for_verification_checks_an_answer_by_hand() {
     let mut bench = bench(&FakeCell::new(0));
-    bench.app.replace_model(led(Some(Ending::GoalReached { error_m: 1e-4 })));
+    bench.app.replace_model(led(Some(Ending::GoalReached {
+        promised: Promised { error_m: 1e-4, least_m: 0.0, of: Promise::Point },
+    })));
     let checked = |app: &App| app.model().by_hand.as_ref().map(|hand| hand.checked);
     let of = |app: &App, role| app.model().document().captures.iter().find(|it| it.role == role).map(|it| it.id);
     let calibrates = of(&bench.app, Role::Calibration).expect("a capture in the fit");

@@ -5,7 +5,6 @@ mod page;
 
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::reach_error::USUAL_TOOL_M;
 use handeye_estimate::resolution::{angle_text, place_text};
 use handeye_result::{
     ArmLevels, CalibrationResult, EstimateDetails, HeldOutByArm, JointErrorEstimate, MethodStatus, TransformEstimate,
@@ -108,13 +107,16 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
 
 /// How near a tool arrives, where the arm is known.
 fn reach(result: &CalibrationResult) -> Option<String> {
-    let (plain, corrected) = result.quality.reach_error_95_mm.zip(result.quality.reach_error_corrected_95_mm)?;
-    let tool_m = result.arm.as_ref().map_or(USUAL_TOOL_M, |arm| Vector3::from(arm.tool_m).norm());
-    Some(format!(
-        "a tool of {:.0} mm arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is, \
-         within {corrected:.3} mm with corrected commands (`handeye correct`)",
-        tool_m * 1e3
-    ))
+    let plain = result.quality.reach_error_95_mm?;
+    let length = result.arm.as_ref().map(|arm| format!(" of {:.0} mm", Vector3::from(arm.tool_m).norm() * 1e3));
+    let stated = format!(
+        "a tool{} arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is",
+        length.unwrap_or_default()
+    );
+    Some(match result.quality.reach_error_corrected_95_mm {
+        Some(corrected) => format!("{stated}, within {corrected:.3} mm with corrected commands (`handeye correct`)"),
+        None => stated,
+    })
 }
 
 /// What was found moves the answer by and what remains of an error, in millimetres: they add up as they are printed.

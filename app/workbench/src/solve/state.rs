@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use handeye_estimate::corrected_arm::CorrectedArm;
-use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::Finding;
+use handeye_estimate::diagnose::{Calibration, Promised};
 use handeye_estimate::verify::{DepthReport, Predictor, Verification, VerifyError};
 use handeye_geometry::progress::Stage;
 use handeye_result::CalibrationResult;
@@ -42,6 +42,16 @@ pub struct Solved {
     pub verified_captures: Vec<CaptureId>,
     /// How long it took \[s\].
     pub took_s: f64,
+}
+
+impl Solved {
+    /// The error that a goal \[m\] is asked of; `None` where none may be stated.
+    pub fn promised(&self, goal_m: f64) -> Option<Promised> {
+        let quality = &self.result.quality;
+        let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
+        let reach = [quality.reach_error_95_mm, quality.reach_error_corrected_95_mm].map(metres);
+        Promised::of(goal_m, reach[0], reach[1], metres(quality.tip_error_95_mm))
+    }
 }
 
 /// What the solver does.

@@ -90,13 +90,13 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
 /// # Errors
 /// When the work was cancelled.
 pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, CalibrateError> {
-    let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3));
+    let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3)).with_arm(job.arm.as_ref());
     let calibration = examine(&job.observations, fit, &goal, work.cancel)?;
     let mut findings = calibration.diagnosis().findings.clone();
     let options = solve_options(job.method, job.options, &job.observations.target);
     let mut result = CalibrationResult::of(&calibration, env!("CARGO_PKG_VERSION"), None, options);
     if let Some(of_views) = &job.arm
-        && !result.state_arm(&calibration, of_views, &job.observations.target)
+        && !result.state_arm(&calibration, of_views)
     {
         tracing::warn!(
             "the reported poses are {:.3} mm RMS from those of the arm by its joint angles: the controller counts with another \
@@ -108,7 +108,7 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
         result.truth = truth::comparison(&result, &truth.tip_from_camera, &truth.intrinsics);
     }
     let depth = depth_camera(job, &calibration);
-    findings.extend(depth.as_ref().and_then(|depth| depth_finding(depth, calibration.tip_error_95_m())));
+    findings.extend(depth.as_ref().and_then(|depth| depth_finding(depth, calibration.error_by_poses_95_m())));
     sort(&mut findings);
     result.depth = depth.as_ref().map(DepthSummary::from);
     result.findings = findings.iter().map(Finding::to_record).collect();

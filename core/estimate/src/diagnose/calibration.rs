@@ -30,8 +30,9 @@ use nalgebra::Point3;
 
 use super::doctor::{self, Diagnosis};
 use super::findings::FindingOptions;
+use crate::handeye::HandEyeError;
 use crate::handeye::joint::SmallSample;
-use crate::handeye::{HandEyeError, Mode};
+use crate::reach_error::{Reach, ReachErrors};
 use crate::stated_uncertainty::{Alternative, StatedUncertainty};
 use crate::{self as estimate, CalibrateError, Fit, LinkCovariances, Method, Observations, Options, resolution};
 use handeye_geometry::point_error;
@@ -42,6 +43,9 @@ use handeye_geometry::progress::Work;
 pub struct Calibration {
     pub(super) fit: Fit,
     pub(super) stated: StatedUncertainty,
+    pub(super) reach: Option<Reach>,
+    /// Of that, at the target: it is asked for often.
+    pub(super) reach_at_target: Option<ReachErrors>,
     pub(super) diagnosis: Diagnosis,
 }
 
@@ -67,7 +71,7 @@ pub fn calibrate_with<'a>(
     observations: &Observations,
     method: Method,
     options: Options,
-    wanted: &FindingOptions,
+    wanted: &FindingOptions<'_>,
     work: impl Into<Work<'a>>,
 ) -> Result<Calibration, CalibrateError> {
     let work = work.into();
@@ -82,7 +86,7 @@ pub fn calibrate_with<'a>(
 pub fn examine<'a>(
     observations: &Observations,
     fit: Fit,
-    wanted: &FindingOptions,
+    wanted: &FindingOptions<'_>,
     work: impl Into<Work<'a>>,
 ) -> Result<Calibration, CalibrateError> {
     let work = work.into();
@@ -107,9 +111,11 @@ impl Calibration {
     }
 
     /// Expected error of a measured point where the camera saw the target, 95 %, metres: 95 % of errors are below. It
-    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. With a camera on an arm whose joints
-    /// are known it is that of the camera on the arm as it really is; beside an arm, by the poses that it reports where the views are.
-    /// Of the joint estimate only, and `None` when the data contradict themselves.
+    /// counts the hand-eye transform alone; the noise of a later robot pose or image comes on top. With an arm whose joints are known it
+    /// is against the arm as it really is, which beside an arm is seldom what is wanted: what shifts all that the arm reports in a part
+    /// of its workspace shifts the camera alike, and its tool meets what the camera sees there, see [`Self::promised`]. With joints that
+    /// are not known it is against the poses that the robot reports. Of the joint estimate only, and `None` when the data contradict
+    /// themselves.
     pub fn tip_error_95_m(&self) -> Option<f64> {
         self.error_95_m(&self.joint.as_ref()?.reference_point)
     }
@@ -132,16 +138,14 @@ impl Calibration {
     }
 
     /// What the errors of the arm say of both links, and how their errors are distributed; `None` where its joints are not known, and
-    /// where views left out contradict them. `None` of a camera beside the arm, too: an arm shifts all that it reports in a part of its
-    /// workspace alike, and the camera with it, so that it meets what the camera sees there.
+    /// where views left out contradict them.
     fn of_links_by_arm(&self) -> Option<([Alternative; 2], SmallSample)> {
-        let arm = self.joint.as_ref()?.arm.as_ref().filter(|arm| !arm.contradicted)?;
-        let answer = self.hand_eye.as_ref().filter(|answer| answer.mode() == Mode::EyeInHand)?;
-        Some((arm.of_links(answer), arm.small_sample))
+        let arm = self.fit.arm()?;
+        Some((arm.of_links(self.hand_eye.as_ref()?), arm.small_sample))
     }
 
-    /// Covariances of the two rigid links as they may be stated: those of the fit, or with a camera on an arm whose joints are known the
-    /// mean squares of what they are off on the arm as it really is, whichever makes the larger error of a measured point.
+    /// Covariances of the two rigid links as they may be stated: those of the fit, or with an arm whose joints are known the mean squares
+    /// of what they are off on the arm as it really is, whichever makes the larger error of a measured point.
     pub fn link_covariances(&self) -> Option<LinkCovariances> {
         let by_poses = self.fit.link_covariances?;
         let Some(point) = self.joint.as_ref().map(|joint| joint.reference_point) else { return Some(by_poses) };
@@ -189,7 +193,8 @@ mod made_up {
     impl Calibration {
         /// As if nothing had been found.
         pub fn as_modelled(fit: Fit) -> Self {
-            Self { fit, stated: StatedUncertainty::AsModelled, diagnosis: Diagnosis::default() }
+            let stated = StatedUncertainty::AsModelled;
+            Self { fit, stated, reach: None, reach_at_target: None, diagnosis: Diagnosis::default() }
         }
 
         /// With another error that may be stated.

@@ -8,6 +8,8 @@ pub mod coverage;
 pub mod doctor;
 pub mod findings;
 pub mod hypotheses;
+mod promise;
 pub mod record;
 
 pub use calibration::{Calibration, calibrate, calibrate_with, examine};
+pub use promise::{Promise, Promised};

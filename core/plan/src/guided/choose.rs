@@ -4,7 +4,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::candidates::ViewRange;
-use super::design::Design;
+use super::design::{Design, Part};
 use crate::carried::Carried;
 use crate::clearance::{Arm, travel};
 use crate::contact::Guard;
@@ -14,7 +14,7 @@ use crate::surroundings::Surroundings;
 use handeye_arm::JointValues;
 use handeye_estimate::Observations;
 use handeye_estimate::handeye::HandEye;
-use handeye_estimate::handeye::joint::{ExpectedView, ViewModel};
+use handeye_estimate::handeye::joint::{ExpectedView, Posture, ViewModel};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
@@ -80,9 +80,8 @@ pub struct Proposal {
     pub travel_s: f64,
     /// Expected error over the box with it and those before it in the plan, over that without any of them.
     pub error_ratio: f64,
-    /// Of what it lowers the variances of rotation and position of the camera by, each weighed by what it does to the
-    /// tip, the part of rotation; what the two have in common is in neither.
-    pub rotation_part: f64,
+    /// What it tells most of, weighed by what that does to the tip.
+    pub part: Part,
 }
 
 /// The views that come next, the first one first.
@@ -190,15 +189,23 @@ impl Chooser<'_> {
             if !self.is_wanted(&base_from_tip, options) {
                 continue;
             }
-            let pixels = self.model.pixels(&base_from_tip, design.covariance());
+            let posture = self.posture(base_from_tip);
+            let pixels = self.model.pixels(&posture, design.covariance());
             if !self.range.surely_shows(target, &pixels, options.doubt_factor) {
                 continue;
             }
             let camera_from_target = Pose::from_isometry(*pixels.camera_from_target());
-            let Some(view) = self.model.expected(&base_from_tip, &all) else { continue };
+            let Some(view) = self.model.expected(&posture, &all) else { continue };
             pool.push(Candidate { camera_from_target, base_from_tip, view, way: Way::Unknown });
         }
         pool
+    }
+
+    /// How the arm stands there, where that matters to what a view says.
+    fn posture(&self, base_from_tip: Pose<Base, Tip>) -> Posture {
+        let robot = self.robot.filter(|_| self.model.has_arm());
+        let tip_from_joints = robot.map(|robot| robot.arm.tip_from_joints(&base_from_tip, &robot.joints));
+        Posture { base_from_tip, tip_from_joints: tip_from_joints.unwrap_or_default() }
     }
 
     /// Not where a view failed, and not turned too far from all views so far.
@@ -380,7 +387,7 @@ fn proposals(pool: &[Candidate], design: &Design, chosen: &[usize]) -> Vec<Propo
             joints,
             travel_s,
             error_ratio: after.error_m() / now_m,
-            rotation_part: after.rotation_part_of_gain(&before),
+            part: after.part_of_gain(&before),
         });
         before = after;
     }

@@ -2,8 +2,9 @@
 //!
 //! The criterion is the trace of the covariance of a measured point, averaged over the box where the tool works:
 //! `tr(W C)` with `C` the covariance of the hand-eye transform and `W = Σ w_p J_pᵀ J_p` over points `p` of the box, where
-//! `J_p` is how the point moves with the transform. A view with the rows `R` changes the covariance of all unknowns to
-//! `C − C Rᵀ (1 + R C Rᵀ)⁻¹ R C`.
+//! `J_p` is how the point moves with the transform. With an arm whose errors are among the unknowns it is the covariance of the
+//! distance from the tip of a tool to such a point, by corrected commands, which turns with those errors too. A view with the rows
+//! `R` changes the covariance of all unknowns to `C − C Rᵀ (1 + R C Rᵀ)⁻¹ R C`.
 //!
 //! # Reference
 //! Fedorov 1972, "Theory of optimal experiments" (linear criteria, one view in and out); Woodbury 1950 for the update.
@@ -18,8 +19,46 @@ use handeye_geometry::targets::TargetSpec;
 #[derive(Debug, Clone)]
 pub struct Design {
     covariance: DMatrix<f64>,
-    /// `W`.
-    weight: Matrix6<f64>,
+    weight: Weight,
+}
+
+/// `W`, of the unknowns that count.
+#[derive(Debug, Clone)]
+pub struct Weight {
+    /// Which they are: the hand-eye transform, and the errors of the arm where they are asked for.
+    places: Vec<usize>,
+    of: DMatrix<f64>,
+}
+
+impl From<Matrix6<f64>> for Weight {
+    /// Of the hand-eye transform alone.
+    fn from(of: Matrix6<f64>) -> Self {
+        Self { places: (0..6).collect(), of: DMatrix::from_iterator(6, 6, of.iter().copied()) }
+    }
+}
+
+impl Weight {
+    /// Of a tool that is sent to a point, see [`Reach::weight`](handeye_estimate::reach_error::Reach::weight), with the hand-eye
+    /// transform and the errors of the arm in these places.
+    pub fn of_reach(places: impl Iterator<Item = usize>, of: DMatrix<f64>) -> Self {
+        Self { places: places.collect(), of }
+    }
+
+    fn mean_square(&self, covariance: &DMatrix<f64>) -> f64 {
+        let counted = covariance.select_rows(&self.places).select_columns(&self.places);
+        self.of.component_mul(&counted).sum()
+    }
+}
+
+/// What of the answer a view tells most of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Where the camera is.
+    Position,
+    /// How it is turned.
+    Rotation,
+    /// The errors of the arm.
+    Arm,
 }
 
 /// `W` over a cube as large as the target about a point in camera coordinates \[m\]: its corners and its middle, each counting
@@ -43,7 +82,7 @@ impl Design {
     pub fn new<'a>(
         prior: DMatrix<f64>,
         views: impl IntoIterator<Item = &'a ExpectedView>,
-        weight: Matrix6<f64>,
+        weight: impl Into<Weight>,
     ) -> Option<Self> {
         let information = views.into_iter().fold(prior, |sum, view| sum + view.information());
         // Unknowns differ by many orders, so the inverse is taken in units of each.
@@ -51,7 +90,7 @@ impl Design {
         let scale: Vec<f64> = (0..n).map(|i| information[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
         let scaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
         let covariance = scaled(&Cholesky::new(scaled(&information))?.inverse());
-        Some(Self { covariance, weight })
+        Some(Self { covariance, weight: weight.into() })
     }
 
     /// Covariance of all unknowns.
@@ -76,26 +115,29 @@ impl Design {
         let mut through = rows * &self.covariance;
         if let Some(factor) = seen(rows, &through) {
             factor.l_dirty().solve_lower_triangular_mut(&mut through);
-            return Self { covariance: &self.covariance - through.tr_mul(&through), weight: self.weight };
+            return Self { covariance: &self.covariance - through.tr_mul(&through), weight: self.weight.clone() };
         }
         self.clone()
     }
 
-    /// Of what the two diagonal parts of the criterion lost since `before`, the part of the rotation of the camera, 0 to 1.
-    pub fn rotation_part_of_gain(&self, before: &Self) -> f64 {
-        let gain = |at: usize| {
+    /// Of the diagonal parts of the criterion the one that lost most since `before`; what two of them have in common is in none.
+    pub fn part_of_gain(&self, before: &Self) -> Part {
+        let gain = |places: std::ops::Range<usize>| {
             let of = |design: &Self| {
-                let weight = design.weight.fixed_view::<3, 3>(at, at).into_owned();
-                weight.component_mul(&design.covariance.fixed_view::<3, 3>(at, at)).sum()
+                let Weight { places: all, of } = &design.weight;
+                let pairs = places.clone().flat_map(|i| places.clone().map(move |j| (i, j)));
+                pairs.map(|(i, j)| of[(i, j)] * design.covariance[(all[i], all[j])]).sum::<f64>()
             };
-            (of(before) - of(self)).max(0.0)
+            of(before) - of(self)
         };
-        let (position, rotation) = (gain(0), gain(3));
-        if position + rotation > 0.0 { rotation / (position + rotation) } else { 0.0 }
+        let count = self.weight.places.len();
+        let of_arm = (count > 6).then(|| (Part::Arm, gain(6..count)));
+        let parts = [(Part::Position, gain(0..3)), (Part::Rotation, gain(3..6))].into_iter().chain(of_arm);
+        parts.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(Part::Position, |(part, _)| part)
     }
 
     fn mean_square(&self) -> f64 {
-        self.weight.component_mul(&self.covariance.fixed_view::<6, 6>(0, 0)).sum()
+        self.weight.mean_square(&self.covariance)
     }
 
     /// By how much a view lowers the mean square.
@@ -103,9 +145,9 @@ impl Design {
         let rows = view.rows();
         let through = rows * &self.covariance;
         let Some(factor) = seen(rows, &through) else { return 0.0 };
-        let mut of_link = through.columns(0, 6).into_owned();
-        factor.l_dirty().solve_lower_triangular_mut(&mut of_link);
-        self.weight.component_mul(&of_link.tr_mul(&of_link)).sum()
+        let mut counted = through.select_columns(&self.weight.places);
+        factor.l_dirty().solve_lower_triangular_mut(&mut counted);
+        self.weight.of.component_mul(&counted.tr_mul(&counted)).sum()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Why a guided session goes on although its expected error is below the goal.
 
-use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS, error_at_upper_levels, worst};
+use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS};
 use handeye_wording::Text;
 use handeye_wording::text;
 
@@ -51,9 +51,8 @@ impl Guide {
 
     /// The same of an answer with so many views.
     pub(super) fn hold_of(&self, known: &Known<'_>, views: usize) -> Option<Hold> {
-        let (calibration, goal_m, tool_box) = (known.calibration?, self.options.goal_m, self.options.tool_box.as_ref());
-        let stated_m = worst(calibration, tool_box, |point| calibration.error_95_m(point))?;
-        if stated_m > goal_m {
+        let (error, goal_m) = (self.judged?, self.options.goal_m);
+        if error.promised.error_m > goal_m {
             return None;
         }
         if views < LEAST_VIEWS {
@@ -62,7 +61,7 @@ impl Guide {
         if !self.is_sound(known.calibration) {
             return Some(Hold::Doubted);
         }
-        let error_m = error_at_upper_levels(calibration, tool_box)?;
+        let error_m = error.at_upper_levels_m;
         Some(if error_m > goal_m { Hold::NoiseLevels { error_m } } else { Hold::Confirmation })
     }
 }

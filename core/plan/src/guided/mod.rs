@@ -7,12 +7,13 @@
 //! in spite of what is not known yet, so moves are small at first and grow with what is known.
 //!
 //! # When it ends
-//! See [`Ending`]. The error is that of the calibration, at the upper 80 % limit of its noise levels: an end that waits for
-//! a small estimate prefers estimates that happen to be small.
+//! See [`Ending`]. The error is what the calibration promises ([`Calibration::promised`]): how near a tool arrives where the arm is
+//! known, else that of a measured point. It counts at the upper 80 % limit of the noise levels: an end that waits for a small
+//! estimate prefers estimates that happen to be small.
 //!
 //! # Degenerate cases
-//! A session whose views determine nothing goes on with the fan. Errors of the robot's arm are not
-//! among what a view is expected to tell.
+//! A session whose views determine nothing goes on with the fan. Where the arm or its joints are not known, its errors are not among
+//! what a view is expected to tell.
 
 pub mod by_hand;
 pub mod candidates;
@@ -20,27 +21,27 @@ pub mod choose;
 pub mod design;
 pub mod fan;
 mod hold;
+mod judged;
 pub mod outlook;
 mod start;
 mod words;
 
 pub use hold::Hold;
+pub use judged::JudgedError;
 
 use nalgebra::Point3;
-use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::Contact;
 use candidates::ViewRange;
 use choose::{ChooseOptions, Chooser, Plan, Proposal, Robot, with_board};
-use design::Design;
+use design::{Design, Part, Weight};
 use handeye_arm::JointValues;
-use handeye_estimate::diagnose::Calibration;
-use handeye_estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, ViewModel};
+use handeye_estimate::diagnose::{Calibration, Promise, Promised};
+use handeye_estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, Posture, ViewModel};
 use handeye_estimate::stated_uncertainty::StatedUncertainty;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_estimate::{Fit, Observations, ViewStatus};
 use handeye_geometry::frames::{Base, Pose, Tip};
-use handeye_geometry::point_error;
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
 
@@ -84,7 +85,7 @@ const CAREFUL_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GuidedOptions {
-    /// The 95 % error that is to be reached, metres.
+    /// The 95 % error that is to be reached, metres, see [`Calibration::promised`].
     pub goal_m: f64,
     /// Views at the most.
     pub most_views: usize,
@@ -167,29 +168,34 @@ pub enum Why {
         /// The tilt, from the first view.
         turn_rad: f64,
     },
-    /// What it lowers the error from and to, metres, and how much of that is rotation of the camera.
+    /// What it lowers the error from and to, metres, and in what most.
     Gain {
-        /// The 95 % error now, by the noise alone.
+        /// The 95 % error now: of a point by the noise alone, or of a tool by corrected commands.
         from_m: f64,
         /// The same with it.
         to_m: f64,
-        /// See [`Proposal::rotation_part`].
-        rotation_part: f64,
+        /// See [`Proposal::part`].
+        part: Part,
     },
 }
 
 /// Why it ends.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ending {
-    /// The error is below the goal. Metres.
+    /// The error is below the goal.
     GoalReached {
-        /// The error that is stated.
-        error_m: f64,
+        /// What is stated.
+        promised: Promised,
     },
     /// The best view would lower the error by less than [`GuidedOptions::least_gain`].
     LittleToGain {
         /// By what part of it.
         gain: f64,
+    },
+    /// More views lower the error no further, or there are as many as allowed, and the arm does not repeat well enough for the goal.
+    Repeatability {
+        /// What is stated, and what of it no view lowers.
+        promised: Promised,
     },
     /// As many views as allowed.
     MostViews,
@@ -227,7 +233,7 @@ pub struct Step {
     pub joints: Option<JointValues>,
     /// Why.
     pub why: Why,
-    /// The 95 % error after it by the noise alone, metres; `None` until there is one.
+    /// The 95 % error after it, as that of [`Why::Gain`], metres; `None` until there is one.
     pub achieved_m: Option<f64>,
     /// How long the arm was to be on its way, seconds.
     pub travel_s: f64,
@@ -274,6 +280,7 @@ pub struct Guide {
     skips: usize,
     steps: Vec<Step>,
     hold: Option<Hold>,
+    judged: Option<JudgedError>,
     ended: Option<Ending>,
 }
 
@@ -292,6 +299,7 @@ impl Guide {
             skips: 0,
             steps: Vec::new(),
             hold: None,
+            judged: None,
             ended: None,
         }
     }
@@ -310,6 +318,11 @@ impl Guide {
     /// Every pose that was proposed, and what came of it.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// The error that the goal was asked of last; `None` where none may be stated.
+    pub fn judged(&self) -> Option<&JudgedError> {
+        self.judged.as_ref()
     }
 
     /// Why it ended; `None` while it goes on.
@@ -349,9 +362,11 @@ impl Guide {
     /// What to do next. Long work polls `cancel`; cancelled it returns an end or a shorter plan, which mean nothing.
     pub fn next(&mut self, known: &Known<'_>, cancel: &CancelToken) -> Next {
         let used = used_views(known.observations, known.fit());
+        let (goal_m, tool_box) = (self.options.goal_m, self.options.tool_box.as_ref());
+        self.judged = known.calibration.and_then(|it| JudgedError::of(it, goal_m, tool_box));
+        let achieved = self.lowered(known);
         if let Some(step) = self.steps.last_mut().filter(|step| step.outcome == Outcome::Captured) {
-            let modelled_m = |calibration| modelled_error_m(calibration, self.options.tool_box.as_ref());
-            step.achieved_m = known.calibration.and_then(modelled_m);
+            step.achieved_m = achieved.map(|achieved| achieved.now_m);
             let last = known.observations.views.len().wrapping_sub(1);
             if known.calibration.is_some_and(|it| it.views.get(last).is_some_and(|v| v.status == ViewStatus::Outlier)) {
                 // It says nothing, and would be proposed again.
@@ -378,7 +393,7 @@ impl Guide {
         next
     }
 
-    fn found(&mut self, known: &Known<'_>, used: &[(Pose<Base, Tip>, Vec<usize>)], cancel: &CancelToken) -> Next {
+    fn found(&mut self, known: &Known<'_>, used: &[UsedView], cancel: &CancelToken) -> Next {
         if let Some(ending) = self.ending(known, used.len()) {
             return Next::End(ending);
         }
@@ -389,9 +404,7 @@ impl Guide {
         if let (0..=1, Some(by)) = (used.len(), known.robot.and_then(contact)) {
             return Next::End(Ending::StartBlocked { by });
         }
-        let target = &known.observations.target;
-        let model = known.calibration.and_then(|calibration| ViewModel::new(calibration, target));
-        let Some(model) = model else { return self.without_answer(known, cancel) };
+        let Some(model) = self.model(known) else { return self.without_answer(known, cancel) };
         let least = if used.len() < CAREFUL_VIEWS { &CAREFUL_NOISE } else { &LEAST_NOISE };
         let noise = at_least(model.noise(), least);
         let model = model.with_noise(noise);
@@ -400,9 +413,7 @@ impl Guide {
         }
         match self.plan(known, &model, used, cancel) {
             None => self.without_answer(known, cancel),
-            Some((plan, modelled_m)) if plan.candidates > 0 => {
-                self.judged(plan, modelled_m, used.len(), self.is_sound(known.calibration))
-            }
+            Some((plan, lowered)) if plan.candidates > 0 => self.worthwhile(known, plan, lowered, used.len()),
             // So little is known that no view is surely in the image: more of the first poses.
             Some(_) => self.first_poses(known, cancel),
         }
@@ -413,15 +424,37 @@ impl Guide {
         if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.first_poses(known, cancel) }
     }
 
-    /// The plan from an estimate, and its error now by the noise alone, metres; `None` where the views so far determine nothing.
+    /// The error as the goal is asked of it, where views are chosen by it: where commands can be corrected, and the arm is driven.
+    fn by_arm(&self, known: &Known<'_>) -> Option<&JudgedError> {
+        let is_corrected = known.calibration?.reach_errors()?.corrected_95_m.is_some() && known.robot.is_some();
+        self.judged.as_ref().filter(|judged| judged.promised.of != Promise::Point && is_corrected)
+    }
+
+    /// The model by which views are chosen.
+    fn model(&self, known: &Known<'_>) -> Option<ViewModel> {
+        let (calibration, target) = (known.calibration?, &known.observations.target);
+        let by_arm = self.by_arm(known).and_then(|_| ViewModel::of_arm(calibration, target));
+        by_arm.or_else(|| ViewModel::new(calibration, target))
+    }
+
+    /// The error that views lower.
+    fn lowered(&self, known: &Known<'_>) -> Option<Lowered> {
+        if let Some(judged) = self.by_arm(known) {
+            return Some(Lowered { now_m: judged.promised.error_m, least_m: judged.promised.least_m });
+        }
+        let now_m = modelled_error_m(known.calibration?, self.options.tool_box.as_ref())?;
+        Some(Lowered { now_m, least_m: 0.0 })
+    }
+
+    /// The plan from an estimate, and what it lowers; `None` where the views so far determine nothing.
     fn plan(
         &mut self,
         known: &Known<'_>,
         model: &ViewModel,
-        used: &[(Pose<Base, Tip>, Vec<usize>)],
+        used: &[UsedView],
         cancel: &CancelToken,
-    ) -> Option<(Plan, f64)> {
-        let modelled_m = modelled_error_m(known.calibration?, self.options.tool_box.as_ref())?;
+    ) -> Option<(Plan, Lowered)> {
+        let lowered = self.lowered(known)?;
         let ground = self.ground(known, model, used, cancel)?;
         self.range = Some(ground.range);
         let options = ChooseOptions {
@@ -442,14 +475,14 @@ impl Guide {
             doubt_factor: self.doubt_factor(),
         };
         let chooser = ground.chooser(model, &known.observations.target);
-        Some((chooser.plan(&ground.design, &options), modelled_m))
+        Some((chooser.plan(&ground.design, &options), lowered))
     }
 
     /// A pose that was not designed, to check the answer at: a view at random that the arm gets to. `index` counts the
     /// checks, `skips` those that somebody left out. `None` where there is no answer, or no such view.
     pub fn check_pose(&self, known: &Known<'_>, index: usize, skips: usize, cancel: &CancelToken) -> Option<Proposal> {
         let target = &known.observations.target;
-        let model = ViewModel::new(known.calibration?, target)?;
+        let model = self.model(known)?;
         let model = model.clone().with_noise(at_least(model.noise(), &LEAST_NOISE));
         let used = used_views(known.observations, known.fit());
         let ground = self.ground(known, &model, &used, cancel)?;
@@ -471,21 +504,25 @@ impl Guide {
         &self,
         known: &Known<'_>,
         model: &ViewModel,
-        used: &[(Pose<Base, Tip>, Vec<usize>)],
+        used: &[UsedView],
         cancel: &'c CancelToken,
     ) -> Option<Ground<'c>> {
         let joint = known.calibration?.joint.as_ref()?;
         let target = &known.observations.target;
         let views = expected_views(model, used);
-        let weight = match &self.options.tool_box {
-            None => design::weight_about(&joint.reference_point, target),
-            Some(tool_box) => design::weight_over(&tool_box.corners_and_middle()),
+        let tool_box = self.options.tool_box.as_ref();
+        let of_reach = known.calibration.filter(|_| model.has_arm()).and_then(|it| it.reach_weight(tool_box));
+        let weight: Weight = match (of_reach, tool_box) {
+            (Some(of_reach), _) => Weight::of_reach(model.hand_eye_and_arm(), of_reach),
+            (None, None) => design::weight_about(&joint.reference_point, target).into(),
+            (None, Some(tool_box)) => design::weight_over(&tool_box.corners_and_middle()).into(),
         };
         let design = Design::new(model.prior(), &views, weight)?;
-        let distances =
-            used.iter().map(|(pose, _)| (model.camera_from_target(pose).isometry() * target.centre()).coords.norm());
+        let distances = used
+            .iter()
+            .map(|view| (model.camera_from_target(&view.posture).isometry() * target.centre()).coords.norm());
         let range = self.range.or_else(|| ViewRange::about(distances))?;
-        let taken = used.iter().map(|(pose, _)| *pose).collect();
+        let taken = used.iter().map(|view| view.posture.base_from_tip).collect();
         let room_m = if used.len() < CAREFUL_VIEWS { CAREFUL_ROOM_M } else { 0.0 };
         let robot = known.robot.map(|robot| with_board(robot, model.hand_eye(), known.observations, room_m));
         Some(Ground { design, range, robot, taken, cancel })
@@ -510,36 +547,71 @@ impl Guide {
         }
     }
 
-    fn judged(&self, plan: Plan, modelled_m: f64, views: usize, is_sound: bool) -> Next {
+    fn worthwhile(&self, known: &Known<'_>, plan: Plan, lowered: Lowered, views: usize) -> Next {
         let Some(first) = plan.proposals.first() else {
-            return Next::End(Ending::NothingInReach { candidates: plan.candidates });
+            let reached = self.reached_after_all(known, views);
+            return Next::End(reached.unwrap_or(Ending::NothingInReach { candidates: plan.candidates }));
         };
-        let gain = 1.0 - plan.best_ratio;
+        let limit = self.repeatability();
+        // Where no view leads to the goal it is the error as a whole that has to be worth one.
+        let ratio = if limit.is_some() { lowered.with_m(plan.best_ratio) / lowered.now_m } else { plan.best_ratio };
+        let gain = 1.0 - ratio;
         if views >= LEAST_VIEWS && gain < self.options.least_gain {
-            return Next::End(if is_sound { Ending::LittleToGain { gain } } else { Ending::Doubted });
+            let reached = self.reached_after_all(known, views).or(limit);
+            let gain = 1.0 - lowered.with_m(plan.best_ratio) / lowered.now_m;
+            let ending = reached.unwrap_or(Ending::LittleToGain { gain });
+            return Next::End(if self.is_sound(known.calibration) { ending } else { Ending::Doubted });
         }
-        let to_m = modelled_m * first.error_ratio;
-        let why = Why::Gain { from_m: modelled_m, to_m, rotation_part: first.rotation_part };
+        let why = Why::Gain { from_m: lowered.now_m, to_m: lowered.with_m(first.error_ratio), part: first.part };
         Next::Go { plan, why }
     }
 
+    /// Where it ends for another reason than a small error: that was not waited for, and is as likely too small as too large.
+    fn reached_after_all(&self, known: &Known<'_>, views: usize) -> Option<Ending> {
+        let promised = self.judged.map(|judged| judged.promised)?;
+        let is_below = views >= LEAST_VIEWS && promised.error_m <= self.options.goal_m;
+        (is_below && self.is_sound(known.calibration)).then_some(Ending::GoalReached { promised })
+    }
+
+    /// Where the arm does not repeat well enough for the goal.
+    fn repeatability(&self) -> Option<Ending> {
+        let promised = self.judged?.promised;
+        (promised.least_m > self.options.goal_m).then_some(Ending::Repeatability { promised })
+    }
+
     fn ending(&mut self, known: &Known<'_>, views: usize) -> Option<Ending> {
-        if let Some(calibration) = known.calibration.filter(|_| views >= LEAST_VIEWS && views != self.solved_views) {
+        if known.calibration.is_some() && views >= LEAST_VIEWS && views != self.solved_views {
             self.solved_views = views;
-            let tool_box = self.options.tool_box.as_ref();
-            let error_m = worst(calibration, tool_box, |point| calibration.error_95_m(point));
-            let is_below =
-                error_at_upper_levels(calibration, tool_box).is_some_and(|error_m| error_m <= self.options.goal_m);
-            self.below = if is_below && self.is_sound(known.calibration) { self.below + 1 } else { 0 };
-            if let (true, Some(error_m)) = (self.below >= IN_A_ROW, error_m) {
-                return Some(Ending::GoalReached { error_m });
+            let below = self.judged.filter(|error| error.at_upper_levels_m <= self.options.goal_m);
+            let below = below.filter(|_| self.is_sound(known.calibration));
+            self.below = if below.is_some() { self.below + 1 } else { 0 };
+            if let Some(error) = below.filter(|_| self.below >= IN_A_ROW) {
+                return Some(Ending::GoalReached { promised: error.promised });
             }
         }
+        let reached = || self.reached_after_all(known, views).or_else(|| self.repeatability());
         let in_fit = known.observations.views.iter().filter(|view| view.in_fit && view.corners.is_some()).count();
         if in_fit >= self.options.most_views {
-            return Some(Ending::MostViews);
+            return Some(reached().unwrap_or(Ending::MostViews));
         }
-        (known.elapsed_s >= self.options.most_s).then_some(Ending::MostTime)
+        let is_over = known.elapsed_s >= self.options.most_s;
+        is_over.then(|| reached().unwrap_or(Ending::MostTime))
+    }
+}
+
+/// An error that views lower, metres.
+#[derive(Debug, Clone, Copy)]
+struct Lowered {
+    now_m: f64,
+    /// What no view lowers it below.
+    least_m: f64,
+}
+
+impl Lowered {
+    /// With this part left of what views lower.
+    fn with_m(&self, ratio: f64) -> f64 {
+        let least = self.least_m.min(self.now_m).powi(2);
+        (least + (self.now_m.powi(2) - least) * ratio * ratio).sqrt()
     }
 }
 
@@ -571,18 +643,6 @@ fn turn_after(skips: usize) -> f64 {
     (std::f64::consts::PI * NEARER_PER_SKIP.powf(skips as f64)).max(LEAST_TURN_RAD)
 }
 
-/// The error that is stated, at the upper limit of the noise levels, metres: where the camera saw the board, or at the worst point
-/// of a box. `None` where nothing may be stated.
-pub fn error_at_upper_levels(calibration: &Calibration, tool_box: Option<&TipBox>) -> Option<f64> {
-    let joint = calibration.joint.as_ref()?;
-    let hand_eye = calibration.hand_eye_covariance()?;
-    worst(calibration, tool_box, |point| {
-        let stated_m = calibration.error_95_m(point)?;
-        let plain_m = point_error::radius_95(&(point_error::covariance(hand_eye, point) / joint.small_sample.scale));
-        Some(stated_m.max(plain_m * upper_level(joint.small_sample.degrees_of_freedom)))
-    })
-}
-
 /// How far the camera may be from where the estimate has it on its mount, 95 %, metres.
 fn camera_unsure_m(calibration: &Calibration) -> f64 {
     calibration.modelled_error_95_at(&Point3::origin()).unwrap_or(f64::INFINITY)
@@ -608,30 +668,28 @@ fn worst(
     }
 }
 
-/// The upper limit of a noise level over its estimate from so many numbers.
-fn upper_level(degrees_of_freedom: f64) -> f64 {
-    match ChiSquared::new(degrees_of_freedom) {
-        Ok(chi) if degrees_of_freedom.is_finite() => {
-            (degrees_of_freedom / chi.inverse_cdf(1.0 - LEVEL_SURE)).max(1.0).sqrt()
-        }
-        _ => 1.0,
-    }
+/// A view that is in the fit.
+struct UsedView {
+    posture: Posture,
+    /// The indices of the corners found in it.
+    corners: Vec<usize>,
 }
 
-/// Reported tip poses of the views that are in the fit, and the indices of the corners found in them.
-fn used_views(observations: &Observations, fit: Option<&Fit>) -> Vec<(Pose<Base, Tip>, Vec<usize>)> {
+/// The views that are in the fit.
+fn used_views(observations: &Observations, fit: Option<&Fit>) -> Vec<UsedView> {
     let is_used =
         |index: usize| fit.is_none_or(|fit| fit.views.get(index).is_some_and(|view| view.status == ViewStatus::Used));
     let of_view = |(index, view): (usize, &handeye_estimate::ObservedView)| {
         let corners = view.corners.as_ref().filter(|_| view.in_fit && is_used(index))?;
-        Some((view.base_from_tip?, corners.iter().map(|corner| corner.index).collect()))
+        let posture = Posture { base_from_tip: view.base_from_tip?, tip_from_joints: view.tip_from_joints.clone() };
+        Some(UsedView { posture, corners: corners.iter().map(|corner| corner.index).collect() })
     };
     observations.views.iter().enumerate().filter_map(of_view).collect()
 }
 
 /// What views that were taken say by a model.
-fn expected_views(model: &ViewModel, used: &[(Pose<Base, Tip>, Vec<usize>)]) -> Vec<ExpectedView> {
-    used.iter().filter_map(|(pose, corners)| model.expected(pose, corners)).collect()
+fn expected_views(model: &ViewModel, used: &[UsedView]) -> Vec<ExpectedView> {
+    used.iter().filter_map(|view| model.expected(&view.posture, &view.corners)).collect()
 }
 
 fn at_least(noise: &Noise, least: &Noise) -> Noise {

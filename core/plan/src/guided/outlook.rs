@@ -1,16 +1,16 @@
 //! How many views there are still to take.
 
 use super::choose::Plan;
-use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS, error_at_upper_levels, used_views};
+use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS, used_views};
 
 impl Guide {
     /// Views that are expected to lead to the goal, those that are planned first; 0 where it is reached. `None` where no error
-    /// may be stated, and where the goal takes more views than are allowed.
+    /// may be stated, and where the goal takes more views than are allowed. Of the last [`Guide::next`].
     ///
     /// Within the plan the error falls as the plan says, beyond it as the square root of the number of views. By the noise
     /// levels as estimated now: with few views they may be off by half.
     pub fn views_left(&self, known: &Known<'_>, plan: &Plan) -> Option<usize> {
-        let ratio = self.options.goal_m / error_at_upper_levels(known.calibration?, self.options.tool_box.as_ref())?;
+        let ratio = self.judged?.ratio_to(self.options.goal_m)?;
         let views = used_views(known.observations, known.fit()).len();
         let by_error = if ratio >= 1.0 { 0 } else { views_to(ratio, views, plan)? };
         // One answer that is good enough may be luck.
@@ -35,6 +35,7 @@ fn views_to(ratio: f64, views: usize, plan: &Plan) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::guided::choose::Proposal;
+    use crate::guided::design::Part;
     use handeye_geometry::frames::Pose;
 
     fn plan(ratios: &[f64]) -> Plan {
@@ -44,7 +45,7 @@ mod tests {
             joints: None,
             travel_s: 1.0,
             error_ratio,
-            rotation_part: 0.5,
+            part: Part::Position,
         };
         Plan { proposals: ratios.iter().map(proposal).collect(), best_ratio: 1.0, candidates: 9 }
     }

@@ -11,7 +11,7 @@
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
 use super::choose::{Plan, Proposal, Robot};
-use super::design::Design;
+use super::design::{Design, Part};
 use super::{
     CAREFUL_NOISE, CAREFUL_ROOM_M, Ending, Guide, Known, LARGEST_FAN_WAY_RAD, MOST_FAN, Next, ViewRange, Why, at_least,
     expected_views, fan, used_views, with_board,
@@ -142,7 +142,7 @@ impl RoughAnswer {
             let camera_from_target = about_board(&self.seen_first, &about, &(middle * *distance), &self.target);
             let base_from_tip = self.model.base_from_tip(&camera_from_target);
             let is_shown = if surely {
-                let pixels = self.model.pixels(&base_from_tip, self.design.covariance());
+                let pixels = self.model.pixels(&base_from_tip.into(), self.design.covariance());
                 self.range.surely_shows(&self.target, &pixels, self.doubt_factor)
             } else {
                 self.range.shows(self.model.intrinsics(), &self.target, &camera_from_target)
@@ -197,6 +197,6 @@ fn go(
     why: Why,
 ) -> Next {
     let proposal =
-        Proposal { base_from_tip, camera_from_target, joints, travel_s: 0.0, error_ratio: 1.0, rotation_part: 1.0 };
+        Proposal { base_from_tip, camera_from_target, joints, travel_s: 0.0, error_ratio: 1.0, part: Part::Rotation };
     Next::Go { plan: Plan { proposals: vec![proposal], best_ratio: 1.0, candidates: 1 }, why }
 }

@@ -1,6 +1,8 @@
 //! Reasons of a guided session in words.
 
+use super::design::Part;
 use super::{Ending, Why};
+use handeye_estimate::diagnose::Promise;
 use handeye_wording::{Text, text};
 
 impl Why {
@@ -23,20 +25,24 @@ impl Why {
                 "Tilted by {turn}° from the first view: small turns do not determine an answer yet",
                 turn = format!("{:.0}", turn_rad.to_degrees())
             ),
-            Self::Gain { from_m, to_m, rotation_part } => {
+            Self::Gain { from_m, to_m, part } => {
                 let (from, to) = (format!("{:.3}", from_m * 1e3), format!("{:.3}", to_m * 1e3));
-                if rotation_part > 0.5 {
-                    text!(
+                match part {
+                    Part::Rotation => text!(
                         "Lowers the expected error from {from} to {to} mm, mostly in the rotation of the camera",
                         from = from,
                         to = to
-                    )
-                } else {
-                    text!(
+                    ),
+                    Part::Position => text!(
                         "Lowers the expected error from {from} to {to} mm, mostly in the position of the camera",
                         from = from,
                         to = to
-                    )
+                    ),
+                    Part::Arm => text!(
+                        "Lowers the expected error from {from} to {to} mm, mostly in the errors of the arm",
+                        from = from,
+                        to = to
+                    ),
                 }
             }
         }
@@ -49,6 +55,7 @@ impl Ending {
         match self {
             Self::GoalReached { .. } => "goal_reached",
             Self::LittleToGain { .. } => "little_to_gain",
+            Self::Repeatability { .. } => "repeatability",
             Self::MostViews => "most_views",
             Self::MostTime => "most_time",
             Self::StartBlocked { .. } => "start_blocked",
@@ -63,9 +70,29 @@ impl Ending {
     /// What it means and, where it is no success, what to do.
     pub fn text(&self) -> Text {
         match self {
-            Self::GoalReached { error_m } => {
-                text!("The goal is reached: the expected error is {error} mm", error = format!("{:.3}", error_m * 1e3))
+            Self::GoalReached { promised } => {
+                let error = format!("{:.3}", promised.error_m * 1e3);
+                match promised.of {
+                    Promise::Point => text!("The goal is reached: the expected error is {error} mm", error = error),
+                    Promise::Reach => text!("The goal is reached: a tool arrives within {error} mm", error = error),
+                    Promise::ReachCorrected => {
+                        text!(
+                            "The goal is reached with corrected commands: a tool arrives within {error} mm",
+                            error = error
+                        )
+                    }
+                }
             }
+            Self::Repeatability { promised } if promised.of == Promise::Reach => text!(
+                "A tool arrives within {least} mm by what the arm is off and does not repeat alone, and more poses do not lower that: have the \
+                 arm calibrated, or ask for less",
+                least = format!("{:.3}", promised.least_m * 1e3)
+            ),
+            Self::Repeatability { promised } => text!(
+                "A tool arrives within {repeatability} mm by what the arm does not repeat alone, and more poses do not lower that: let it \
+                 settle longer before each image, or ask for less",
+                repeatability = format!("{:.3}", promised.least_m * 1e3)
+            ),
             Self::LittleToGain { gain } => text!(
                 "The best further pose would lower the expected error by {percent} % only: for a smaller error take a larger \
                  board, a camera of higher resolution or a more accurate robot",

@@ -9,13 +9,17 @@ use crate::guided::{Ending, Guide, GuidedOptions, Known, Next, Step};
 use crate::{self as plan, ArmBody, Carried, Obstacle, Pace, Surroundings};
 use handeye_arm::testing as arms;
 use handeye_arm::{Arm, ArmKind, JointValues};
-use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::corrected_arm::CorrectedArm;
+use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::diagnose::{Calibration, calibrate_with};
 use handeye_estimate::handeye::joint::{Noise, ViewModel};
 use handeye_estimate::handeye::{HandEye, Mode};
-use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView};
+use handeye_estimate::placement::{ArmOfViews, Placement};
+use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Method, Observations, ObservedView, Options};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Mount, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
+use handeye_geometry::se3;
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::{Field, Links, noise_twist, robot_error};
 use handeye_simulate::session::{REALISTIC, bent, camera, seen};
@@ -89,11 +93,14 @@ pub struct HiddenErrors {
     pub bend_m: [f64; 2],
     /// True focal length over that of the lens which is stated to be known.
     pub focal: f64,
+    /// Standard deviations of what every joint but the last is displaced by about and along each axis, radians and metres; with them the
+    /// views know the joints.
+    pub links: Option<(f64, f64)>,
 }
 
 impl HiddenErrors {
     /// All is as it is stated to be.
-    pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0 };
+    pub const NOTHING: Self = Self { bend_m: [0.0; 2], focal: 1.0, links: None };
 }
 
 /// Where everything is in a cell, and what its arm must not touch.
@@ -131,6 +138,10 @@ pub struct GuidedCell {
     points: Vec<Point3<f64>>,
     /// Errors of the robot that depend on where it stands.
     field: Option<Field>,
+    /// The chain as it is, where it is not as its controller has it.
+    true_chain: Option<Arm>,
+    /// Joint values of the views, where they know them, radians.
+    joints_rad: Vec<Option<Vec<f64>>>,
 }
 
 /// What came of a guided session.
@@ -150,6 +161,8 @@ pub struct GuidedRun {
     pub times_s: Vec<f64>,
 }
 
+/// Where the tip of a tool is in the frame of the tip, metres.
+const TOOL_M: [f64; 3] = [0.0, 0.0, 0.1];
 /// Free space that the arm keeps, metres.
 const CLEARANCE_M: f64 = 0.02;
 /// How fast its joints are driven.
@@ -211,6 +224,14 @@ impl GuidedCell {
             _ => lens,
         };
         let focal = setup.untold.focal;
+        let mut of_links = ChaCha8Rng::seed_from_u64(setup.seed ^ 0x117c5);
+        let true_chain = setup.untold.links.map(|(rad, m)| {
+            let mut moved: Vec<Isometry3<f64>> =
+                (0..arm.chain.joint_count()).map(|_| se3::exp(&noise_twist(&mut of_links, m, rad))).collect();
+            // A tool behind the last joint would be found with the same arm, which hides what that is moved by along its axis.
+            moved[arm.chain.joint_count() - 1] = Isometry3::identity();
+            arm.chain.displaced(&moved).expect("small")
+        });
         let reported = Intrinsics { fx: lens.fx / focal, fy: lens.fy / focal, ..lens };
         let (intrinsics, knowledge) =
             if setup.free_lens { (free, CameraKnowledge::NOTHING) } else { (lens, CameraKnowledge::Fixed(reported)) };
@@ -229,6 +250,8 @@ impl GuidedCell {
             },
             points: bent(&BOARD.points(), setup.untold.bend_m, 1.0),
             field: None,
+            true_chain,
+            joints_rad: Vec::new(),
         })
     }
 
@@ -248,13 +271,27 @@ impl GuidedCell {
     /// Drives the arm there and captures; whether the whole board was in the image.
     pub fn capture(&mut self, joints: &JointValues) -> bool {
         self.robot.joints = *joints;
-        self.capture_at(&self.base_from_tip())
+        let at = self.base_from_tip();
+        let Some(mut view) = self.view(&at) else { return false };
+        if self.true_chain.is_some() {
+            view.tip_from_joints = self.robot.arm.tip_from_joints(&at, joints);
+        }
+        self.observations.views.push(view);
+        self.joints_rad.push(self.true_chain.as_ref().map(|_| joints.to_vec()));
+        true
+    }
+
+    /// Where the tip is with these joint values.
+    fn true_tip(&self, joints: &[f64]) -> Pose<Base, Tip> {
+        let Some(chain) = &self.true_chain else { return self.robot.arm.tip(joints).expect("its own joints") };
+        plan::Arm { chain: chain.clone(), ..self.robot.arm.clone() }.tip(joints).expect("its own joints")
     }
 
     /// Captures at a tip pose that the robot reports, however it got there; whether the whole board was in the image.
     pub fn capture_at(&mut self, base_from_tip: &Pose<Base, Tip>) -> bool {
         let Some(view) = self.view(base_from_tip) else { return false };
         self.observations.views.push(view);
+        self.joints_rad.push(None);
         true
     }
 
@@ -262,7 +299,8 @@ impl GuidedCell {
     fn view(&mut self, base_from_tip: &Pose<Base, Tip>) -> Option<ObservedView> {
         let error = robot_error(&mut self.rng, &self.setup.noise);
         let by_place = self.field.map_or_else(Isometry3::identity, |field| field.error(base_from_tip));
-        let true_tip = Pose::from_isometry(base_from_tip.isometry() * by_place * error);
+        let by_links = if self.true_chain.is_some() { self.true_tip(&self.robot.joints) } else { *base_from_tip };
+        let true_tip = Pose::from_isometry(by_links.isometry() * by_place * error);
         let camera_from_target = self.links.camera_from_target(&true_tip);
         let no_more = |_| Vector2::zeros();
         let corners = seen(
@@ -313,7 +351,61 @@ impl GuidedCell {
 
     /// The calibration from the views so far.
     pub fn calibrate(&self) -> Option<Calibration> {
-        calibrate(&self.observations, Method::Joint, &CancelToken::default()).ok()
+        let of_views = self.true_chain.as_ref().map(|_| self.arm_of_views());
+        let wanted = FindingOptions::default().with_arm(of_views.as_ref());
+        calibrate_with(&self.observations, Method::Joint, Options::default(), &wanted, &CancelToken::default()).ok()
+    }
+
+    /// The arm as its controller has it.
+    fn arm_of_views(&self) -> ArmOfViews {
+        let plan::Arm { chain, world_from_arm, connection_from_tip, .. } = &self.robot.arm;
+        let mounted =
+            chain.clone().mounted(world_from_arm * chain.base_from_first, chain.flange_from_tip * connection_from_tip);
+        let misses = vec![(0.0, 0.0); self.observations.views.len()];
+        ArmOfViews {
+            placement: Placement { arm: mounted, misses },
+            tool_m: TOOL_M,
+            joints_rad: self.joints_rad.clone(),
+        }
+    }
+
+    /// Distances of a tool from points of the board that the camera saw, one a view, when it is sent there by corrected commands,
+    /// metres, against the board, or beside the arm along the mean axis of the tip; of those that the arm gets to.
+    ///
+    /// # Panics
+    /// Where the calibration does not know the arm.
+    pub fn touches_m(&self, calibration: &Calibration) -> Vec<f64> {
+        let errors = calibration.arm().expect("the joints are known");
+        let corrected = CorrectedArm::new(self.arm_of_views().placement.arm, errors).expect("its own");
+        let found = errors.hand_eye.mount_from_camera();
+        let (camera, target) = (self.links.mount_from_camera.isometry(), self.links.anchor_from_target.isometry());
+        let tool = Point3::from(TOOL_M);
+        let axes = self.joints_rad.iter().flatten().map(|joints| self.true_tip(joints).rotation() * Vector3::z());
+        let along = match self.setup.mode {
+            Mode::EyeInHand => target.rotation,
+            Mode::EyeToHand => UnitQuaternion::rotation_between(&Vector3::z(), &axes.sum::<Vector3<f64>>())
+                .expect("not the other way round"),
+        };
+        let touch = |(k, joints): (usize, &Vec<f64>)| {
+            let corner = self.points[7 * k % self.points.len()];
+            let (true_tip, tip) = (*self.true_tip(joints).isometry(), *corrected.actual(joints).ok()?.isometry());
+            let (in_camera, point, seen) = match self.setup.mode {
+                Mode::EyeInHand => {
+                    let in_camera = (true_tip * camera).inverse() * (target * corner);
+                    (in_camera, target * corner, tip * found.isometry() * in_camera)
+                }
+                Mode::EyeToHand => {
+                    let in_camera = camera.inverse() * (true_tip * target * corner);
+                    (in_camera, camera * in_camera, found.isometry() * in_camera)
+                }
+            };
+            assert!(in_camera.z > 0.0, "it is seen");
+            let turn = along * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.4 * k as f64);
+            let goal = Isometry3::from_parts((seen.coords - turn * tool.coords).into(), turn);
+            let command = corrected.command(&Pose::from_isometry(goal), joints).ok()?;
+            Some((self.true_tip(&command.joints_rad).isometry() * tool - point).norm())
+        };
+        self.joints_rad.iter().flatten().enumerate().filter_map(touch).collect()
     }
 
     /// A whole guided session from the first view on.

@@ -79,7 +79,8 @@ class Arm:
     heldout_px: Optional[Tuple[float, float]]
     """RMS of the corners of views left out, predicted by reported and by corrected poses, pixels."""
     contradicted: bool
-    """Whether views left out are predicted worse by corrected poses, by more than chance: then do not correct."""
+    """Whether views left out contradict the errors, being predicted worse by corrected poses than chance and the model explain: then do
+    not correct."""
 
     @classmethod
     def _of(cls, document: Mapping[str, Any]) -> Optional[Arm]:

@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_plan::guided::{Ending, GuidedOptions};
 use handeye_session::{CaptureId, CaptureRecord};
 
@@ -275,11 +276,14 @@ fn guided_capture_that_was_broken_off_between_two_poses_or_at_a_check_is_continu
         });
         model
     };
-    for ending in [None, Some(Ending::GoalReached { error_m: 3e-4 })] {
+    for ending in
+        [None, Some(Ending::GoalReached { promised: Promised { error_m: 3e-4, least_m: 0.0, of: Promise::Point } })]
+    {
         let mut pane = pane(guided(ending));
         assert_eq!(pane.click("Continue the sequence"), [Command::Taught(taught::Command::ContinueSequence)]);
     }
-    let mut over = guided(Some(Ending::GoalReached { error_m: 3e-4 }));
+    let mut over =
+        guided(Some(Ending::GoalReached { promised: Promised { error_m: 3e-4, least_m: 0.0, of: Promise::Point } }));
     over.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("guided").is_over = true;
     assert!(!pane(over).sees("Continue the sequence"), "there is nothing to go on with");
 }

@@ -1,6 +1,7 @@
 //! The expected error by number of poses: how it fell, how it will fall, and where the goal is.
 
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, Ui, WidgetInfo, WidgetType};
+use handeye_estimate::diagnose::Promise;
 use handeye_estimate::handeye::joint::prediction::{ErrorCurve, ErrorPoint};
 use handeye_estimate::stated_uncertainty::StatedUncertainty;
 
@@ -28,18 +29,30 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
         instead_ui(ui, tr!(language, "The expected error appears with the first joint calibration"));
         return;
     };
-    let goal_mm = model.view.goal.0 * 1e3;
+    // Where a tool is known the goal is asked of it, and poses are planned for it.
+    let promised = model.solve.solved.as_ref().and_then(|solved| solved.promised(model.view.goal.0));
+    let is_of_point = promised.is_none_or(|promised| promised.of == Promise::Point);
+    let goal_mm = is_of_point.then_some(model.view.goal.0 * 1e3);
     ui.label(RichText::new(verdict(curve, now, goal_mm).in_language(language)).color(Palette::of(ui).text));
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);
-    let chart = Chart::new(curve, axes::plot_rect(room), goal_mm, planned(model, now));
+    let planned = if is_of_point { planned(model, now) } else { Vec::new() };
+    let chart = Chart::new(curve, axes::plot_rect(room), goal_mm, planned);
     chart.paint(ui, curve, now, goal_mm, model);
     chart.hover_ui(ui, curve, language);
 }
 
-/// Where we are and what the goal takes.
-pub fn verdict(curve: &ErrorCurve, (views, error_m): (usize, f64), goal_mm: f64) -> Text {
-    let (error, goal) = (numbers::error_mm(error_m), format!("{goal_mm:.2}"));
+/// Where we are and what the goal takes, where it is asked of this error.
+pub fn verdict(curve: &ErrorCurve, (views, error_m): (usize, f64), goal_mm: Option<f64>) -> Text {
+    let error = numbers::error_mm(error_m);
+    let Some(goal_mm) = goal_mm else {
+        return text!(
+            "{error} mm (95 %) with {views} poses by the noise alone: what the errors of the arm add is not in it",
+            error = error,
+            views = views
+        );
+    };
+    let goal = format!("{goal_mm:.2}");
     if error_m * 1e3 <= goal_mm {
         return text!(
             "{error} mm (95 %) with {views} poses: the goal of {goal} mm is reached",
@@ -86,9 +99,9 @@ fn all(curve: &ErrorCurve) -> impl Iterator<Item = (&ErrorPoint, f64, bool)> {
 }
 
 impl Chart {
-    fn new(curve: &ErrorCurve, plot: Rect, goal_mm: f64, planned: Vec<(usize, f64)>) -> Self {
+    fn new(curve: &ErrorCurve, plot: Rect, goal_mm: Option<f64>, planned: Vec<(usize, f64)>) -> Self {
         let errors = all(curve).map(|(_, error_mm, _)| error_mm);
-        let scale = Scale::logarithmic(errors.chain(planned.iter().map(|(_, mm)| *mm)).chain(std::iter::once(goal_mm)));
+        let scale = Scale::logarithmic(errors.chain(planned.iter().map(|(_, mm)| *mm)).chain(goal_mm));
         let views = || all(curve).map(|(point, _, _)| point.views).chain(planned.iter().map(|(views, _)| *views));
         Self { plot, scale, most_views: views().max().unwrap_or(1), fewest_views: views().min().unwrap_or(0), planned }
     }
@@ -102,7 +115,7 @@ impl Chart {
         Pos2::new(self.x(views), axes::y(self.plot, self.scale, error_mm))
     }
 
-    fn paint(&self, ui: &Ui, curve: &ErrorCurve, now: (usize, f64), goal_mm: f64, model: &Model) {
+    fn paint(&self, ui: &Ui, curve: &ErrorCurve, now: (usize, f64), goal_mm: Option<f64>, model: &Model) {
         let (language, fresh) = (model.view.language, model.solve.fresh);
         let palette = Palette::of(ui);
         let colour = if fresh { Marks::of(ui).fit } else { palette.weak };
@@ -111,12 +124,14 @@ impl Chart {
         let y_name = tr!(language, "Expected error, 95 % [mm]");
         axes::axes_ui(ui, self.plot, self.scale, y_name, tr!(language, "Number of poses"), &ticks);
         let painter = ui.painter();
-        let goal_y = axes::y(self.plot, self.scale, goal_mm);
-        let goal_line = [Pos2::new(self.plot.left(), goal_y), Pos2::new(self.plot.right(), goal_y)];
-        painter.extend(Shape::dashed_line(&goal_line, Stroke::new(1.5, palette.good), 6.0, 4.0));
-        let words = text!("Goal {goal} mm", goal = format!("{goal_mm:.2}")).in_language(language);
-        let at = Pos2::new(self.plot.right() - 4.0, goal_y - 2.0);
-        painter.text(at, Align2::RIGHT_BOTTOM, words, FontId::proportional(CAPTION), palette.good);
+        if let Some(goal_mm) = goal_mm {
+            let goal_y = axes::y(self.plot, self.scale, goal_mm);
+            let goal_line = [Pos2::new(self.plot.left(), goal_y), Pos2::new(self.plot.right(), goal_y)];
+            painter.extend(Shape::dashed_line(&goal_line, Stroke::new(1.5, palette.good), 6.0, 4.0));
+            let words = text!("Goal {goal} mm", goal = format!("{goal_mm:.2}")).in_language(language);
+            let at = Pos2::new(self.plot.right() - 4.0, goal_y - 2.0);
+            painter.text(at, Align2::RIGHT_BOTTOM, words, FontId::proportional(CAPTION), palette.good);
+        }
 
         let line = |later: bool| -> Vec<Pos2> {
             all(curve)

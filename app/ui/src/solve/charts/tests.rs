@@ -98,11 +98,13 @@ fn the_expected_error_says_what_the_goal_takes() {
     let point = |views, mm: f64| ErrorPoint { views, tip_error_95_m: Some(mm * 1e-3) };
     let curve = ErrorCurve { gathered: vec![point(3, 2.0), point(10, 1.0)], further: vec![point(20, 0.7)] };
     let now = curve.now().expect("known");
-    let say = |goal_mm| accuracy::verdict(&curve, now, goal_mm).in_language(Language::English);
+    let say = |goal_mm| accuracy::verdict(&curve, now, Some(goal_mm)).in_language(Language::English);
     assert_eq!(say(1.5), "1.00 mm (95 %) with 10 poses: the goal of 1.50 mm is reached");
     // Half the error takes four times the poses.
     assert_eq!(say(0.5), "1.00 mm (95 %) with 10 poses: about 30 more like these reach the goal of 0.50 mm");
     assert_eq!(say(0.0), "1.00 mm (95 %) with 10 poses");
+    let by_noise = accuracy::verdict(&curve, now, None).in_language(Language::English);
+    assert!(by_noise.starts_with("1.00 mm (95 %) with 10 poses by the noise alone"), "{by_noise}");
 }
 
 #[test]

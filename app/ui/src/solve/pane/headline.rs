@@ -1,7 +1,7 @@
 //! The numbers that matter: the expected error where the tool works, against the goal, and how near a tool arrives by this arm.
 
+use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_estimate::reach_error::USUAL_TOOL_M;
-use nalgebra::Vector3;
 
 use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichText, Stroke, Ui};
 
@@ -11,20 +11,18 @@ use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Solved};
 use handeye_workbench::report::in_parts;
 use handeye_workbench::solve;
+use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
 /// Size of the number.
 const FIGURE: f32 = 28.0;
-/// Size of those of the arm.
-const REACH_FIGURE: f32 = 20.0;
 
 /// The card.
 pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) {
-    let language = model.view.language;
-    let goal_mm = model.view.goal.0 * 1e3;
-    let error_mm = solved.result.quality.tip_error_95_mm;
-    let tone = match error_mm {
-        Some(error_mm) if error_mm <= goal_mm => Tone::Good,
+    let goal_m = model.view.goal.0;
+    let promised = solved.promised(goal_m);
+    let tone = match promised {
+        Some(promised) if promised.error_m <= goal_m => Tone::Good,
         _ => Tone::Warning,
     };
     let palette = Palette::of(ui);
@@ -35,95 +33,134 @@ pub fn headline_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Out
         .inner_margin(Margin::symmetric(12, 8))
         .show(ui, |ui| {
             ui.set_min_width(ui.available_width());
-            ui.horizontal(|ui| {
-                let figure = match error_mm {
-                    Some(error_mm) => format!("{error_mm:.3} mm"),
-                    None => tr!(language, "Not known").to_owned(),
-                };
-                ui.label(RichText::new(figure).size(FIGURE).color(palette.text));
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| goal_ui(ui, model, goal_mm, outbox));
-            });
-            ui.label(RichText::new(tr!(language, "Expected error (95 %)")).strong().color(palette.text));
-            let meaning = match (error_mm, model.method == "joint") {
-                (Some(_), _) => tr!(
-                    language,
-                    "In 95 of 100 cases the calibration puts a point where the board was seen no further off than this. \
-                     What the robot and the image add at that moment comes on top."
-                ),
-                (None, true) => tr!(
-                    language,
-                    "The captures contradict themselves or do not determine it: no error can be stated. See what was found below."
-                ),
-                (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),
-            };
-            ui.add(Label::new(RichText::new(meaning).color(palette.weak)).wrap());
-            let moved_mm = solved.result.estimate.as_ref().and_then(|estimate| estimate.moved_mm);
-            if let Some((error_mm, moved_mm)) = error_mm.zip(moved_mm) {
-                let (moved, rest) = in_parts(error_mm, moved_mm);
-                let words = text!(
-                    "What was found below would move the answer by {moved} mm, which is known to {rest} mm.",
-                    moved = moved,
-                    rest = rest
-                );
-                ui.add(Label::new(RichText::new(words.in_language(language)).color(palette.tone(Tone::Warning))).wrap());
+            let is_of_tool = reach_ui(ui, model, solved, outbox);
+            if !is_of_tool {
+                expected_error_ui(ui, model, solved, outbox);
             }
-            if let Some(error_mm) = error_mm {
-                let verdict = if error_mm <= goal_mm {
-                    tr!(language, "The goal is reached")
-                } else {
-                    tr!(language, "The goal is not reached yet")
-                };
-                ui.label(RichText::new(verdict).color(palette.tone(tone)));
+            if let Some(promised) = promised {
+                verdict_ui(ui, model, solved, &promised, tone);
             }
-            reach_ui(ui, model, solved);
+            if is_of_tool {
+                error_of_a_point_ui(ui, model, solved);
+            }
         });
 }
 
-/// How near a tool arrives, where the arm is known: the calibration is one part of that, and the arm another.
-fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
+fn verdict_ui(ui: &mut Ui, model: &Model, solved: &Solved, promised: &Promised, tone: Tone) {
     let language = model.view.language;
-    let quality = &solved.result.quality;
-    let Some((as_it_is, corrected)) = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm) else {
-        return;
+    let is_reached = promised.error_m <= model.view.goal.0;
+    let verdict = match (promised.of, is_reached) {
+        (Promise::ReachCorrected, true) => tr!(
+            language,
+            "The goal is reached with corrected commands: the arm is the limit. “handeye correct” makes their table."
+        ),
+        (_, true) => tr!(language, "The goal is reached"),
+        (_, false) => tr!(language, "The goal is not reached yet"),
     };
     let palette = Palette::of(ui);
+    ui.add(Label::new(RichText::new(verdict).color(palette.tone(tone))).wrap());
+    let repeats = solved.calibration.reach_errors().map(|reach| reach.repeatability_95_m);
+    let limit = repeats.filter(|repeats| !is_reached && promised.of != Promise::Point && *repeats > model.view.goal.0);
+    if let Some(limit_m) = limit {
+        let words = text!(
+            "{limit} mm of it is what the arm does not repeat: more captures do not lower that.",
+            limit = format!("{:.2}", limit_m * 1e3)
+        );
+        ui.add(Label::new(RichText::new(words.in_language(language)).color(palette.tone(Tone::Warning))).wrap());
+    }
+}
+
+/// The expected error of a measured point, where nothing is known of a tool.
+fn expected_error_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let palette = Palette::of(ui);
+    let error_mm = solved.result.quality.tip_error_95_mm;
+    ui.horizontal(|ui| {
+        let figure = match error_mm {
+            Some(error_mm) => format!("{error_mm:.3} mm"),
+            None => tr!(language, "Not known").to_owned(),
+        };
+        ui.label(RichText::new(figure).size(FIGURE).color(palette.text));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| goal_ui(ui, model, outbox));
+    });
+    ui.label(RichText::new(tr!(language, "Expected error (95 %)")).strong().color(palette.text));
+    let meaning = match (error_mm, model.method == "joint") {
+        (Some(_), _) => meaning_of_point(language),
+        (None, true) => tr!(
+            language,
+            "The captures contradict themselves or do not determine it: no error can be stated. See what was found below."
+        ),
+        (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),
+    };
+    ui.add(Label::new(RichText::new(meaning).color(palette.weak)).wrap());
+    moved_ui(ui, model, solved, error_mm);
+}
+
+fn meaning_of_point(language: Language) -> &'static str {
+    tr!(
+        language,
+        "In 95 of 100 cases the calibration puts a point where the board was seen no further off than this. \
+         What the robot and the image add at that moment comes on top."
+    )
+}
+
+/// What the findings would move of an error.
+fn moved_ui(ui: &mut Ui, model: &Model, solved: &Solved, error_mm: Option<f64>) {
+    let moved_mm = solved.result.estimate.as_ref().and_then(|estimate| estimate.moved_mm);
+    if let Some((error_mm, moved_mm)) = error_mm.zip(moved_mm) {
+        let (moved, rest) = in_parts(error_mm, moved_mm);
+        let words = text!(
+            "What was found below would move the answer by {moved} mm, which is known to {rest} mm.",
+            moved = moved,
+            rest = rest
+        );
+        let tone = Palette::of(ui).tone(Tone::Warning);
+        ui.add(Label::new(RichText::new(words.in_language(model.view.language)).color(tone)).wrap());
+    }
+}
+
+/// The same under what a tool arrives within: the part of the calibration alone.
+fn error_of_a_point_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
+    let language = model.view.language;
+    let Some(error_mm) = solved.result.quality.tip_error_95_mm else { return };
+    let words = text!("Expected error of a measured point: {error} mm (95 %)", error = format!("{error_mm:.3}"));
+    let label = RichText::new(words.in_language(language)).color(Palette::of(ui).weak);
     ui.add_space(4.0);
-    ui.label(RichText::new(tr!(language, "A tool arrives within (95 %)")).strong().color(palette.text));
+    ui.label(label).on_hover_text(meaning_of_point(language));
+    moved_ui(ui, model, solved, Some(error_mm));
+}
+
+/// How near a tool arrives, which is what people calibrate for; whether the arm is known and that is.
+fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) -> bool {
+    let language = model.view.language;
+    let quality = &solved.result.quality;
+    let Some(as_it_is) = quality.reach_error_95_mm else { return false };
+    let palette = Palette::of(ui);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(tr!(language, "A tool arrives within (95 %)")).strong().color(palette.text));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| goal_ui(ui, model, outbox));
+    });
     ui.horizontal_wrapped(|ui| {
-        for (mm, how) in [
-            (as_it_is, tr!(language, "by the controller as it is")),
-            (corrected, tr!(language, "with corrected commands")),
-        ] {
-            ui.label(RichText::new(format!("{mm:.2} mm")).size(REACH_FIGURE).color(palette.text));
+        let corrected = quality.reach_error_corrected_95_mm.map(|mm| (mm, tr!(language, "with corrected commands")));
+        let ways = std::iter::once((as_it_is, tr!(language, "by the controller as it is"))).chain(corrected);
+        for (mm, how) in ways {
+            ui.label(RichText::new(format!("{mm:.2} mm")).size(FIGURE).color(palette.text));
             ui.label(RichText::new(how).color(palette.weak));
             ui.add_space(12.0);
         }
     });
-    let tool = solved.result.arm.as_ref().map_or(USUAL_TOOL_M, |arm| Vector3::from(arm.tool_m).norm());
+    let tool = solved.calibration.tool_length_m().unwrap_or(USUAL_TOOL_M);
     let meaning = text!(
         "Distance between a point of the board that the camera saw and the tip of a tool of {tool} mm that is sent there.",
         tool = format!("{:.0}", tool * 1e3)
     );
     ui.add(Label::new(RichText::new(meaning.in_language(language)).color(palette.weak)).wrap());
-    let goal_mm = model.view.goal.0 * 1e3;
-    let calibrated = quality.tip_error_95_mm.is_some_and(|error_mm| error_mm <= goal_mm);
-    if as_it_is > goal_mm && (calibrated || solved.calibration.moved_by_arm_m().is_some()) {
-        let advice = if corrected <= goal_mm {
-            tr!(language, "The arm is the limit: correct its commands, for which “handeye correct” makes the table.")
-        } else {
-            tr!(
-                language,
-                "The arm is the limit: captures with more different postures of the arm tell its \
-                 errors better."
-            )
-        };
-        ui.add(Label::new(RichText::new(advice).color(palette.tone(Tone::Warning))).wrap());
-    }
+    true
 }
 
-fn goal_ui(ui: &mut Ui, model: &Model, goal_mm: f64, outbox: &mut Outbox) {
+fn goal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
-    let mut goal_mm = goal_mm;
+    let mut goal_mm = model.view.goal.0 * 1e3;
     // From the right: the field first, then its name.
     let field = DragValue::new(&mut goal_mm).range(0.001..=1000.0).speed(0.01).max_decimals(3).suffix(" mm");
     // Half a number is no goal.

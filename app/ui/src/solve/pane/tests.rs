@@ -58,7 +58,7 @@ fn the_headline_is_the_expected_error_and_not_a_residual() {
 fn what_a_tool_arrives_within_is_said_and_that_the_arm_is_the_limit_where_it_is() {
     let with = |as_it_is, corrected| {
         driven(sample::with_answer(|solved| {
-            solved.result.quality.tip_error_95_mm = Some(0.2);
+            solved.result.quality.tip_error_95_mm = Some(1.234);
             solved.result.quality.reach_error_95_mm = as_it_is;
             solved.result.quality.reach_error_corrected_95_mm = corrected;
         }))
@@ -68,14 +68,18 @@ fn what_a_tool_arrives_within_is_said_and_that_the_arm_is_the_limit_where_it_is(
     pane.steps();
     assert!(pane.sees("A tool arrives within (95 %)") && pane.sees("2.91 mm") && pane.sees("0.25 mm"));
     assert!(pane.sees("a tool of 100 mm"));
-    assert!(pane.sees("The arm is the limit: correct its commands"));
+    assert!(pane.sees("The goal is reached with corrected commands: the arm is the limit"));
+    assert!(pane.sees("Expected error of a measured point: 1.234 mm (95 %)"));
     pane.model().view.goal = Goal(0.22e-3);
     pane.steps();
-    assert!(pane.sees("The arm is the limit: captures with more"), "corrected commands do not reach it either");
+    assert!(pane.sees("The goal is not reached yet"), "corrected commands do not reach it either");
     pane.model().view.goal = Goal(3e-3);
     pane.steps();
-    assert!(!pane.sees("The arm is the limit"));
-    assert!(!with(None, None).sees("A tool arrives"), "an arm that is not known promises nothing");
+    assert!(pane.sees("The goal is reached") && !pane.sees("The arm is the limit"), "commands as they are do");
+    let pane = with(Some(2.91), None);
+    assert!(pane.sees("2.91 mm") && !pane.sees("with corrected commands"), "its controller has another chain");
+    let pane = with(None, None);
+    assert!(!pane.sees("A tool arrives") && pane.sees("1.234 mm"), "an arm that is not known promises nothing");
 }
 
 #[test]

@@ -36,6 +36,8 @@ use serde::Serialize;
 use crate::diagnose::Calibration;
 use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOptions, Severity};
 use crate::diagnose::hypotheses::NEED;
+use crate::diagnose::promise;
+use crate::reach_error::Reach;
 use crate::stated_uncertainty::StatedUncertainty;
 use crate::{Fit, Observations};
 use handeye_geometry::progress::Work;
@@ -130,7 +132,7 @@ const HOPELESS: f64 = 0.2;
 /// What is wrong with observations of which there is no fit, or whose fit does not matter: the hypotheses do not depend on it.
 ///
 /// `work` is a `&CancelToken`, or a [`Work`]; when it is cancelled [`Diagnosis::untested`] says so.
-pub fn diagnose<'a>(observations: &Observations, options: &FindingOptions, work: impl Into<Work<'a>>) -> Diagnosis {
+pub fn diagnose<'a>(observations: &Observations, options: &FindingOptions<'_>, work: impl Into<Work<'a>>) -> Diagnosis {
     let mut diagnosis = Diagnosis::default();
     if let Err(why) = examine(observations, None, &mut diagnosis, &work.into()) {
         diagnosis.untested = Some(why);
@@ -142,7 +144,7 @@ pub fn diagnose<'a>(observations: &Observations, options: &FindingOptions, work:
 pub(super) fn examined(
     observations: &Observations,
     fit: Fit,
-    options: &FindingOptions,
+    options: &FindingOptions<'_>,
     work: &Work<'_>,
 ) -> Calibration {
     let repaired = as_found(observations, &fit);
@@ -157,7 +159,10 @@ pub(super) fn examined(
     if diagnosis.findings.iter().any(|finding| finding.severity == Severity::Problem) {
         stated = StatedUncertainty::Nothing;
     }
-    let calibration = Calibration { fit, stated, diagnosis: Diagnosis::default() };
+    let reach = options.arm.filter(|_| stated != StatedUncertainty::Nothing);
+    let reach = reach.and_then(|arm| promise::reach(&fit, arm, &observations.target));
+    let reach_at_target = reach.as_ref().and_then(Reach::at_target);
+    let calibration = Calibration { fit, stated, reach, reach_at_target, diagnosis: Diagnosis::default() };
     // After the claim: the goal is judged by it.
     let of_estimate = findings::findings(observations, Some(&calibration), options);
     Calibration { diagnosis: diagnosis.with(of_estimate), ..calibration }

@@ -75,9 +75,10 @@ pub(super) fn with_own_lens(stated: StatedUncertainty, calibration: &estimate::F
 }
 
 /// What may be stated where the robot's field leaves the size of the target open: a size that is off as prints and rulers are would
-/// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it.
+/// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it. Where the
+/// errors of the arm are known they tell a size from an arm.
 pub(super) fn with_open_size(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
-    let size = calibration.joint.as_ref().and_then(JointFit::open_size);
+    let size = calibration.joint.as_ref().filter(|_| calibration.arm().is_none()).and_then(JointFit::open_size);
     match size {
         Some(size) => also(stated, size.with.clone()),
         None => stated,
@@ -102,7 +103,9 @@ fn counts_on(calibration: &estimate::Fit, effect: Effect) -> bool {
     match effect {
         Effect::Warp => joint.free.warp,
         Effect::Scale => joint.free.scale,
-        Effect::Joint(_) | Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
+        // Its stated error counts the zeros of the arm.
+        Effect::Joint(_) => calibration.arm().is_some(),
+        Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,
     }
 }
 

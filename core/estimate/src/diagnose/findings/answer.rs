@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Finding, FindingCode, FindingOptions, Severity};
-use crate::diagnose::Calibration;
+use crate::diagnose::{Calibration, Promise, Promised};
 use crate::stated_uncertainty::StatedUncertainty;
 use crate::{JointFit, ViewResult, ViewStatus, resolution};
 use handeye_geometry::statistics::{SIGMA_PER_MEDIAN_SIZE, median};
@@ -36,7 +36,7 @@ const DISAGREE_M: f64 = 5e-3;
 /// More of the same views than this many times those gathered are no advice.
 const MOST_TIMES: usize = 4;
 
-pub fn findings(calibration: &Calibration, options: &FindingOptions) -> Vec<Finding> {
+pub fn findings(calibration: &Calibration, options: &FindingOptions<'_>) -> Vec<Finding> {
     let used: Vec<&ViewResult> = calibration.views.iter().filter(|v| v.status == ViewStatus::Used).collect();
     let mut found = Vec::new();
     found.extend(influence(calibration, &used));
@@ -71,7 +71,7 @@ fn stands_out<'a>(
 }
 
 fn influence(calibration: &Calibration, used: &[&ViewResult]) -> Option<Finding> {
-    let error_m = calibration.tip_error_95_m()?;
+    let error_m = calibration.error_by_poses_95_m()?;
     let (view, largest_m, median_m) = stands_out(used, |v| v.influence_m)?;
     if largest_m < (INFLUENCE * error_m).max(resolution::PLACE_M) {
         return None;
@@ -193,7 +193,7 @@ fn robot_field(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     let (mm, deg) = (joint.noise.field_m * 1e3, joint.noise.field_rad.to_degrees());
-    let by_arm = joint.arm.as_ref().filter(|arm| !arm.contradicted).and_then(|arm| arm.heldout_px);
+    let by_arm = calibration.arm().and_then(|arm| arm.heldout_px);
     if let Some([without, with]) = by_arm.filter(|[without, with]| with < without) {
         let text = text!(
             "The robot's errors depend on where it stands: {mm} mm and {deg}° per axis at a typical distance from the middle of \
@@ -331,49 +331,115 @@ fn closed_forms(calibration: &Calibration) -> Option<Finding> {
 }
 
 fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
-    let curve = &calibration.joint.as_ref()?.error_curve;
-    let error_mm = calibration.tip_error_95_m()? * 1e3;
-    let finding = |code, severity, text| {
-        Finding::new(code, severity, text).with("expected_error_95", error_mm, "mm").with("goal", goal_mm, "mm")
-    };
-    if error_mm <= goal_mm {
-        let text = text!(
+    let promised = calibration.promised(goal_mm * 1e-3, None)?;
+    let (error_mm, goal) = (promised.error_m * 1e3, shown(goal_mm, 3));
+    let is_reached = error_mm <= goal_mm;
+    let error = shown(error_mm, 3);
+    let text = match (promised.of, is_reached) {
+        (Promise::Point, true) => text!(
             "Good enough: the expected error of {error} mm (95 %) is below the goal of {goal} mm. Verify with captures that \
              were not in the fit.",
-            error = shown(error_mm, 3),
-            goal = shown(goal_mm, 3)
-        );
-        return Some(finding(FindingCode::GoalReached, Severity::Info, text));
-    }
-    let (views, _) = curve.now()?;
-    let needed = curve.views_for(goal_mm * 1e-3);
-    let not_reached = |advice: Text| {
-        let text = text!(
+            error = error,
+            goal = goal
+        ),
+        (Promise::Reach, true) => text!(
+            "Good enough: a tool arrives within {error} mm (95 %), below the goal of {goal} mm. Verify with captures that were not in \
+             the fit.",
+            error = error,
+            goal = goal
+        ),
+        (Promise::ReachCorrected, true) => text!(
+            "Good enough with corrected commands: with them a tool arrives within {error} mm (95 %), below the goal of {goal} mm. Correct \
+             the commands by the errors of the arm, for which `handeye correct` makes the table.",
+            error = error,
+            goal = goal
+        ),
+        (Promise::Point, false) => text!(
             "The expected error of {error} mm (95 %) is above the goal of {goal} mm. {advice}",
-            error = shown(error_mm, 3),
-            goal = shown(goal_mm, 3),
-            advice = advice
-        );
-        finding(FindingCode::GoalNotReached, Severity::Advice, text)
+            error = error,
+            goal = goal,
+            advice = towards_goal(calibration, goal_mm)?.0
+        ),
+        (Promise::Reach, false) => text!(
+            "A tool arrives within {error} mm (95 %), and the goal is {goal} mm. {advice}",
+            error = error,
+            goal = goal,
+            advice = towards_reach(calibration, &promised, goal_mm)
+        ),
+        (Promise::ReachCorrected, false) => text!(
+            "Even with corrected commands a tool arrives within {error} mm (95 %), and the goal is {goal} mm. {advice}",
+            error = error,
+            goal = goal,
+            advice = towards_reach(calibration, &promised, goal_mm)
+        ),
     };
+    let (code, severity) = if is_reached {
+        (FindingCode::GoalReached, Severity::Info)
+    } else {
+        (FindingCode::GoalNotReached, Severity::Advice)
+    };
+    let finding =
+        Finding::new(code, severity, text).with("expected_error_95", calibration.tip_error_95_m()? * 1e3, "mm");
+    let finding = finding.with("goal", goal_mm, "mm");
+    let (reach, of_point) = (calibration.reach_errors(), promised.of == Promise::Point && !is_reached);
+    let numbers = reach.into_iter().flat_map(|reach| {
+        let corrected = reach.corrected_95_m.map(|metres| ("reach_error_corrected_95", metres));
+        let repeatability = ("repeatability_95", reach.repeatability_95_m);
+        [Some(("reach_error_95", reach.as_it_is_95_m)), corrected, Some(repeatability)]
+    });
+    let finding = numbers.flatten().fold(finding, |finding, (name, metres)| finding.with(name, metres * 1e3, "mm"));
+    let advised = if of_point { towards_goal(calibration, goal_mm)?.1 } else { None };
+    Some(advised.into_iter().fold(finding, |finding, (name, value, unit)| finding.with(name, value, unit)))
+}
+
+/// What lowers the error of a tool.
+fn towards_reach(calibration: &Calibration, promised: &Promised, goal_mm: f64) -> Text {
+    let least_mm = promised.least_m * 1e3;
+    if calibration.stated != StatedUncertainty::AsModelled {
+        return text!("More views do not help until what was found is corrected.");
+    }
+    match promised.of {
+        Promise::Reach if least_mm > goal_mm => text!(
+            "{least} mm of it is what the arm is off and does not repeat, and more views do not lower that: have the arm calibrated.",
+            least = shown(least_mm, 3)
+        ),
+        Promise::ReachCorrected if least_mm > goal_mm => text!(
+            "{repeatability} mm of it is what the arm does not repeat, and more views do not lower that: let it settle longer, \
+             or use an arm that repeats better.",
+            repeatability = shown(least_mm, 3)
+        ),
+        _ => {
+            text!("Views with more different postures of the arm, and with the board tilted and turned more, lower it.")
+        }
+    }
+}
+
+/// Evidence for an advice.
+type Advised = Option<(&'static str, f64, &'static str)>;
+
+/// What lowers the error of a measured point.
+fn towards_goal(calibration: &Calibration, goal_mm: f64) -> Option<(Text, Advised)> {
     if let Some(moved_m) = calibration.moved_by_arm_m() {
         let advice = text!(
             "Most of it, {moved} mm, are errors of the arm, and more views do not lower it: correct the commands by them, for which \
              `handeye correct` makes the table, or have the arm calibrated.",
             moved = shown(moved_m * 1e3, 3)
         );
-        return Some(not_reached(advice).with("moved_by_arm", moved_m * 1e3, "mm"));
+        return Some((advice, Some(("moved_by_arm", moved_m * 1e3, "mm"))));
     }
     if calibration.stated != StatedUncertainty::AsModelled {
-        return Some(not_reached(text!("More views do not help until what was found is corrected.")));
+        return Some((text!("More views do not help until what was found is corrected."), None));
     }
-    let Some(needed) = needed.filter(|n| *n <= MOST_TIMES * views) else {
-        return Some(not_reached(text!(
+    let curve = &calibration.joint.as_ref()?.error_curve;
+    let (views, _) = curve.now()?;
+    let Some(needed) = curve.views_for(goal_mm * 1e-3).filter(|n| *n <= MOST_TIMES * views) else {
+        let advice = text!(
             "More views like these would take too many: tilt and turn the camera more, come closer, or reduce the noise."
-        )));
+        );
+        return Some((advice, None));
     };
     // The curve's error equals the stated one but for rounding, so one more is the least that can help.
     let more = needed.saturating_sub(views).max(1);
     let advice = text!("About {more} more {more|view|views} like those gathered will reach it.", more = more);
-    Some(not_reached(advice).with("more_views", more as f64, ""))
+    Some((advice, Some(("more_views", more as f64, ""))))
 }

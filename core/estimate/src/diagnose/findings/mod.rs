@@ -22,6 +22,7 @@ use serde::Serialize;
 
 use crate::Observations;
 use crate::diagnose::Calibration;
+use crate::placement::ArmOfViews;
 
 /// One number that supports a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -34,18 +35,26 @@ pub struct Evidence {
     pub unit: &'static str,
 }
 
-/// What the user wants.
+/// What the user wants, and has.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
-pub struct FindingOptions {
-    /// The expected error to reach (95 %, see [`Calibration::tip_error_95_m`]), millimetres; `None` for no goal.
+pub struct FindingOptions<'a> {
+    /// The expected error to reach (95 %, see [`Calibration::promised`]), millimetres; `None` for no goal.
     pub goal_mm: Option<f64>,
+    /// The arm, its tool and its joints in the views; `None` where its chain is not known.
+    pub arm: Option<&'a ArmOfViews>,
 }
 
-impl FindingOptions {
+impl<'a> FindingOptions<'a> {
     /// With an error to reach (95 %), millimetres; `None` for no goal.
     pub const fn with_goal_mm(goal_mm: Option<f64>) -> Self {
-        Self { goal_mm }
+        Self { goal_mm, arm: None }
+    }
+
+    /// With the arm of the views of the calibration, for the errors that a tool arrives within.
+    #[must_use]
+    pub const fn with_arm(self, arm: Option<&'a ArmOfViews>) -> Self {
+        Self { arm, ..self }
     }
 }
 
@@ -56,7 +65,7 @@ impl FindingOptions {
 pub fn findings(
     observations: &Observations,
     calibration: Option<&Calibration>,
-    options: &FindingOptions,
+    options: &FindingOptions<'_>,
 ) -> Vec<Finding> {
     let mut found = views::findings(observations, calibration);
     if let Some(calibration) = calibration {

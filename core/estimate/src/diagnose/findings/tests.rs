@@ -54,7 +54,7 @@ fn turned(mut t: Session, about: &Vector3<f64>, about_deg: f64, across: &Vector3
 fn a_good_session_has_no_warning_and_says_when_the_goal_is_reached() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let t = trial(mode, 30, &REALISTIC, camera(), 81);
-        let found = of_trial(&t, false, &FindingOptions { goal_mm: Some(1.0) });
+        let found = of_trial(&t, false, &FindingOptions::with_goal_mm(Some(1.0)));
         let bad: Vec<_> = found.iter().filter(|f| f.severity > Severity::Advice).collect();
         assert!(bad.is_empty(), "{mode:?}: {bad:?}");
         let reached = find(&found, FindingCode::GoalReached).expect("below a millimetre");
@@ -70,11 +70,11 @@ fn the_views_that_a_goal_takes_are_those_that_reach_it() {
     let observations = t.observations(false);
     let calibration = solve(&observations);
     let goal_mm = calibration.tip_error_95_m().expect("joint") * 1e3 / 1.95;
-    let found = findings(&observations, Some(&calibration), &FindingOptions { goal_mm: Some(goal_mm) });
+    let found = findings(&observations, Some(&calibration), &FindingOptions::with_goal_mm(Some(goal_mm)));
     let finding = find(&found, FindingCode::GoalNotReached).expect("above");
     let more = finding.value("more_views").expect("within reach");
     assert!((28.0..=29.0).contains(&more), "{more}");
-    let found = findings(&observations, Some(&calibration), &FindingOptions { goal_mm: Some(goal_mm / 10.0) });
+    let found = findings(&observations, Some(&calibration), &FindingOptions::with_goal_mm(Some(goal_mm / 10.0)));
     let finding = find(&found, FindingCode::GoalNotReached).expect("above");
     assert_eq!(finding.value("more_views"), None, "four hundred times the views are no advice: {finding}");
     let found = findings(&observations, Some(&calibration), &FindingOptions::default());
@@ -106,7 +106,7 @@ fn too_few_views_are_a_problem_below_three_and_advice_below_ten() {
 fn no_views_at_all_is_a_finding_and_no_panic() {
     let mut observations = set(3, 84).observations(true);
     observations.views.clear();
-    let found = findings(&observations, None, &FindingOptions { goal_mm: Some(f64::NAN) });
+    let found = findings(&observations, None, &FindingOptions::with_goal_mm(Some(f64::NAN)));
     assert_eq!(found.len(), 1);
     assert_eq!(found[0].code, FindingCode::TooFewViews);
 }

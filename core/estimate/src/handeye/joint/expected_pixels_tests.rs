@@ -9,7 +9,7 @@ use handeye_simulate::session::{REALISTIC, camera, trial};
 
 /// Where a model has a point of the board in a view.
 fn pixel(model: &ViewModel, base_from_tip: &Pose<Base, Tip>, point: &Point3<f64>) -> nalgebra::Vector2<f64> {
-    let seen = model.camera_from_target(base_from_tip).isometry() * point;
+    let seen = model.camera_from_target(&(*base_from_tip).into()).isometry() * point;
     model.intrinsics().project(&seen).expect("in front of the camera")
 }
 
@@ -27,7 +27,7 @@ fn a_pixel_is_as_unsure_as_it_moves_with_what_is_unsure() {
         for unknown in 0..truth.unknowns() {
             let mut covariance = DMatrix::zeros(truth.unknowns(), truth.unknowns());
             covariance[(unknown, unknown)] = SIGMA * SIGMA;
-            let (px, sigma_px) = truth.pixels(&base_from_tip, &covariance).of(&point).expect("in view");
+            let (px, sigma_px) = truth.pixels(&base_from_tip.into(), &covariance).of(&point).expect("in view");
 
             let mut step = Vector6::zeros();
             let moved = match unknown {
@@ -59,13 +59,13 @@ fn a_view_like_those_taken_is_surer_than_links_and_lens_are_by_themselves() {
     let model = ViewModel::known(links, trial.intrinsics, true, REALISTIC, &BOARD);
     let all: Vec<usize> = (0..BOARD.len()).collect();
     let of_view = |view: &handeye_geometry::targets::observation::View| {
-        model.expected(&view.base_from_tip, &all).expect("it determines a pose").information()
+        model.expected(&view.base_from_tip.into(), &all).expect("it determines a pose").information()
     };
     let information = trial.views.iter().map(of_view).fold(model.prior(), |sum, view| sum + view);
     let covariance = information.try_inverse().expect("six views");
     let apart = DMatrix::from_diagonal(&covariance.diagonal());
     let sigma_px = |covariance: &DMatrix<f64>| {
-        let pixels = model.pixels(&trial.views[2].base_from_tip, covariance);
+        let pixels = model.pixels(&trial.views[2].base_from_tip.into(), covariance);
         pixels.of(&BOARD.points()[0]).expect("in view").1.norm()
     };
     // The robot's 0.1 mm and 0.02° are 0.3 px of it.

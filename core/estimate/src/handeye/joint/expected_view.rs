@@ -7,15 +7,16 @@
 //! `F / corner_px²` about lens and shape. Both are kept as rows `R` with `Rᵀ R` the information, so that a view is a change
 //! of low rank.
 
-use nalgebra::{Cholesky, DMatrix, Matrix6, Vector2, Vector6};
+use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector2, Vector6};
 
-use super::arm_errors::KINDS;
+use super::arm_errors::{ArmErrors, KINDS};
 use super::chain::Chain;
 use super::expected_pixels::ExpectedPixels;
 use super::pose_dependent_error::{HALF, PoseDependentError, SLOPES};
 use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
-use super::{Free, Noise};
+use super::{Free, Noise, SIZE_SIGMA};
 use crate::Fit;
+use crate::arm_fit::BesideArm;
 use crate::handeye::{HandEye, Mode};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -27,8 +28,23 @@ use handeye_geometry::view_equations::{PoseEquations, ViewInput, Whitener};
 /// Part of its largest diagonal entry below which a pivot is rounding.
 const NO_PIVOT: f64 = 1e-12;
 
+/// How the robot stands in a view.
+#[derive(Debug, Clone)]
+pub struct Posture {
+    /// Tip pose as the controller reports it.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// Its joints, as [`View::tip_from_joints`]; empty where they are not known.
+    pub tip_from_joints: Vec<Isometry3<f64>>,
+}
+
+impl From<Pose<Base, Tip>> for Posture {
+    /// Its joints are not known.
+    fn from(base_from_tip: Pose<Base, Tip>) -> Self {
+        Self { base_from_tip, tip_from_joints: Vec::new() }
+    }
+}
+
 /// The model that a calibration ended with: what its views share, and how noisy they are.
-///
 #[derive(Debug, Clone)]
 pub struct ViewModel {
     hand_eye: HandEye,
@@ -38,6 +54,7 @@ pub struct ViewModel {
     board: BoardPoints,
     shape: BoardShape,
     field: Option<PoseDependentError>,
+    arm: Option<ArmErrors>,
     layout: Layout,
 }
 
@@ -68,6 +85,30 @@ impl ViewModel {
             board: BoardPoints::new(&target.points()),
             shape: joint.shape.map_or_else(BoardShape::default, |estimate| estimate.shape),
             field,
+            arm: None,
+            layout,
+        })
+    }
+
+    /// The same with the errors of the arm among the unknowns; `None` where the calibration does not know them, see [`Fit::arm`].
+    pub fn of_arm(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
+        let arm = calibration.arm()?;
+        let BesideArm { intrinsics, shape, field, free } = arm.beside.clone();
+        let free = Free { depth: false, ..free };
+        let layout = Layout {
+            form: free.form().count(&intrinsics),
+            field: field.as_ref().map_or(0, |_| SLOPES),
+            arm: arm.errors.counts(),
+        };
+        Some(Self {
+            hand_eye: arm.hand_eye,
+            intrinsics,
+            free,
+            noise: arm.noise,
+            board: BoardPoints::new(&target.points()),
+            shape,
+            field,
+            arm: Some(arm.errors.clone()),
             layout,
         })
     }
@@ -83,7 +124,7 @@ impl ViewModel {
         let free = Free { intrinsics: free_lens, ..Free::default() };
         let layout = Layout { form: free.form().count(&intrinsics), field: 0, arm: [0; KINDS] };
         let board = BoardPoints::new(&target.points());
-        Self { hand_eye, intrinsics, free, noise, board, shape: BoardShape::default(), field: None, layout }
+        Self { hand_eye, intrinsics, free, noise, board, shape: BoardShape::default(), field: None, arm: None, layout }
     }
 
     /// The same with other noise levels.
@@ -112,12 +153,22 @@ impl ViewModel {
         &self.intrinsics
     }
 
+    /// Whether the errors of the arm are among the unknowns.
+    pub fn has_arm(&self) -> bool {
+        self.arm.is_some()
+    }
+
+    /// Where the hand-eye transform and the errors of the arm are among the unknowns.
+    pub fn hand_eye_and_arm(&self) -> impl Iterator<Item = usize> {
+        (0..6).chain(self.layout.arm_at()..self.layout.count())
+    }
+
     /// Number of the unknowns that all views share.
     pub fn unknowns(&self) -> usize {
         self.layout.count()
     }
 
-    /// What is known of the unknowns without any view: of the slopes of the robot's field their level; of the rest so
+    /// What is known of the unknowns without any view: of the slopes of the robot's field and of the errors of the arm their levels; of the rest so
     /// little that any few views know more, and enough that every question has an answer.
     pub fn prior(&self) -> DMatrix<f64> {
         let mut sigma = vec![1.0; self.unknowns()];
@@ -130,6 +181,14 @@ impl ViewModel {
         for k in 0..self.layout.field {
             sigma[self.layout.field_at() + k] = if k < HALF { self.noise.field_m } else { self.noise.field_rad };
         }
+        if self.free.scale {
+            sigma[Layout::FORM_AT + self.free.form().scale_at(&self.intrinsics)] = SIZE_SIGMA;
+        }
+        let [.., angles, lengths, compliances] = self.layout.effects();
+        let levels = [self.noise.link_rad, self.noise.link_m, self.noise.compliance_rad];
+        for (places, level) in [angles, lengths, compliances].into_iter().zip(levels) {
+            sigma[places].fill(level);
+        }
         DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
             sigma.len(),
             sigma.iter().map(|sigma| sigma.max(f64::MIN_POSITIVE.sqrt()).powi(-2)),
@@ -138,8 +197,8 @@ impl ViewModel {
 
     /// The pose of the target in a view, and the equations of the view at it; `None` where `corners`, by their index, do
     /// not determine a pose, or are not in front of the camera.
-    fn block(&self, base_from_tip: &Pose<Base, Tip>, corners: &[usize]) -> Option<ViewBlock> {
-        let chain = self.chain(base_from_tip);
+    fn block(&self, posture: &Posture, corners: &[usize]) -> Option<ViewBlock> {
+        let chain = self.chain(posture);
         // Where the corners were found does not matter to what they say.
         let corners: Vec<Corner> = corners.iter().map(|&index| Corner::new(index, Vector2::zeros())).collect();
         let seen = ViewInput {
@@ -151,31 +210,33 @@ impl ViewModel {
             depths: None,
         };
         let equations = PoseEquations::new(&seen, &chain.camera_from_target, self.free.form()).ok()?;
-        let place = self.field.as_ref().map(|field| field.place(base_from_tip));
+        let place = self.field.as_ref().map(|field| field.place(&posture.base_from_tip));
         ViewBlock::new(&chain, &equations, self.layout, place.as_ref())
     }
 
-    fn chain(&self, base_from_tip: &Pose<Base, Tip>) -> Chain {
+    fn chain(&self, posture: &Posture) -> Chain {
+        let Posture { base_from_tip, tip_from_joints } = posture;
         let by_field = self.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(base_from_tip));
-        let view = View::new(String::new(), *base_from_tip, Vec::new());
+        let view =
+            View { tip_from_joints: tip_from_joints.clone(), ..View::new(String::new(), *base_from_tip, Vec::new()) };
         let (mount, anchor) = (self.hand_eye.mount_from_camera(), self.hand_eye.anchor_from_target());
-        Chain::with_arm(self.mode(), &view, None, &by_field, &mount, &anchor)
+        Chain::with_arm(self.mode(), &view, self.arm.as_ref(), &by_field, &mount, &anchor)
     }
 
-    /// Where the target is in a view from a reported tip pose.
-    pub fn camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Pose<Camera, Target> {
-        Pose::from_isometry(self.chain(base_from_tip).camera_from_target)
+    /// Where the target is in a view.
+    pub fn camera_from_target(&self, posture: &Posture) -> Pose<Camera, Target> {
+        Pose::from_isometry(self.chain(posture).camera_from_target)
     }
 
-    /// From where the robot would see the target so, without its field.
+    /// From where the robot would see the target so, without its field and the errors of its arm.
     pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
         self.hand_eye.base_from_tip(camera_from_target)
     }
 
-    /// What a view from a reported tip pose says, in which the corners with these indices are found; `None` where they do
-    /// not determine a pose or are not in front of the camera.
-    pub fn expected(&self, base_from_tip: &Pose<Base, Tip>, corners: &[usize]) -> Option<ExpectedView> {
-        let block = self.block(base_from_tip, corners)?;
+    /// What a view says in which the corners with these indices are found; `None` where they do not determine a pose or are not in
+    /// front of the camera. One whose joints are not known says nothing of the errors of the arm.
+    pub fn expected(&self, posture: &Posture, corners: &[usize]) -> Option<ExpectedView> {
+        let block = self.block(posture, corners)?;
         let weights = PixelWeights::new(&self.noise);
         let n = self.unknowns();
         let by_robot = block.by_correction * weights.pose.sqrt();
@@ -190,11 +251,11 @@ impl ViewModel {
         Some(ExpectedView { rows })
     }
 
-    /// Where the points of the target are expected in a view from a reported tip pose, with shared unknowns of that covariance.
-    pub fn pixels<'a>(&'a self, base_from_tip: &Pose<Base, Tip>, covariance: &'a DMatrix<f64>) -> ExpectedPixels<'a> {
+    /// Where the points of the target are expected in a view, with shared unknowns of that covariance.
+    pub fn pixels<'a>(&'a self, posture: &Posture, covariance: &'a DMatrix<f64>) -> ExpectedPixels<'a> {
         let lens = if self.free.intrinsics { self.intrinsics.parameter_count() } else { 0 };
-        let field = self.field.as_ref().map(|field| (field, base_from_tip));
-        let chain = self.chain(base_from_tip);
+        let field = self.field.as_ref().map(|field| (field, &posture.base_from_tip));
+        let chain = self.chain(posture);
         ExpectedPixels::new(&self.intrinsics, &chain, (self.layout, lens), field, &self.noise, covariance)
     }
 }

@@ -72,7 +72,7 @@ use handeye_geometry::targets::observation::Corner;
 pub use arm_errors::{ArmErrors, ArmParameter, LEVELS_OF_ARMS, LinkError, TrueTip, arm_parameters};
 pub use chain::{camera_from_target, correction_transform};
 pub use expected_pixels::ExpectedPixels;
-pub use expected_view::{ExpectedView, ViewModel};
+pub use expected_view::{ExpectedView, Posture, ViewModel};
 pub use integrated::SmallSample;
 pub use pose_dependent_error::{FIELD_VIEWS, PoseDependentError, corrected_base_from_tip};
 pub use weights::CornerWeights;

@@ -216,7 +216,7 @@ impl Wanted {
     fn says_as_much(&self, base_from_tip: &Pose<Base, Tip>) -> bool {
         let Some(Worth { model, design, ratio }) = &self.worth else { return false };
         let all: Vec<usize> = (0..self.target.len()).collect();
-        let Some(view) = model.expected(base_from_tip, &all) else { return false };
+        let Some(view) = model.expected(&(*base_from_tip).into(), &all) else { return false };
         let there = design.error_with_m(&view) / design.error_m();
         // Gains add up as logarithms.
         *ratio < 1.0 && there.ln() <= WORTH * ratio.ln()

@@ -37,7 +37,7 @@ fn first_views_are_asked_for_by_how_they_look_and_what_is_skipped_does_not_come_
     let at = cell.base_from_tip();
     assert!(cell.capture_at(&at));
     let truth = cell.truth();
-    let first = truth.camera_from_target(&at);
+    let first = truth.camera_from_target(&at.into());
     let mut guide = HandGuide::new(options());
     let next = |guide: &mut HandGuide, calibration: Option<&handeye_estimate::diagnose::Calibration>| match guide.next(
         &cell.known(calibration, 0.0),
@@ -77,7 +77,7 @@ fn views_that_are_skipped_lead_to_nearer_ones() {
     let mut guide = HandGuide::new(options());
     let mut turn_deg = |skip: bool| {
         let known = cell.known(Some(&calibration), 0.0);
-        let first = truth.camera_from_target(&taken[0]);
+        let first = truth.camera_from_target(&taken[0].into());
         let next = guide.next(&known, &first, truth.intrinsics(), &CancelToken::default());
         let HandNext::Take(wanted) = next else { panic!("{next:?}") };
         let tip = truth.base_from_tip(&wanted.camera_from_target);
@@ -105,7 +105,7 @@ fn another_view_that_says_as_much_is_as_good() {
     let calibration = run.calibration.expect("six views");
     let truth = cell.truth();
     let mut guide = HandGuide::new(options());
-    let first = truth.camera_from_target(&cell.base_from_tip());
+    let first = truth.camera_from_target(&cell.base_from_tip().into());
     let known = cell.known(Some(&calibration), 0.0);
     let HandNext::Take(wanted) = guide.next(&known, &first, truth.intrinsics(), &CancelToken::default()) else {
         panic!("there is more to gain")

@@ -1,0 +1,145 @@
+//! What a calibration promises, and is asked for: how near a tool arrives where the arm is known, else how near a point is measured.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::Calibration;
+use crate::corrected_arm::CorrectedArm;
+use crate::placement::ArmOfViews;
+use crate::reach_error::{Reach, ReachErrors, Seen};
+use crate::uncertainty::quality::TipBox;
+use crate::{Fit, ViewStatus};
+use handeye_geometry::targets::TargetSpec;
+
+/// The error that a goal is asked of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Promised {
+    /// 95 % of errors are below, metres.
+    pub error_m: f64,
+    /// The part of it that no view lowers, as far as it is known, metres.
+    pub least_m: f64,
+    /// Error of what.
+    pub of: Promise,
+}
+
+/// What a promise is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Promise {
+    /// A point that the camera measures: of the arm nothing is known.
+    Point,
+    /// A tool that is sent to such a point, by commands as they are.
+    Reach,
+    /// The same by corrected commands.
+    ReachCorrected,
+}
+
+impl Promised {
+    /// What a goal is asked of, from what a tool arrives within by commands as they are and by corrected ones and from the expected error
+    /// of a measured point, metres: commands as they are where these meet the goal, corrected ones else if they are better; a
+    /// point where of a tool nothing is known.
+    pub fn of(goal_m: f64, as_it_is_m: Option<f64>, corrected_m: Option<f64>, point_m: Option<f64>) -> Option<Self> {
+        let Some(as_it_is) = as_it_is_m else {
+            return point_m.map(|error_m| Self { error_m, least_m: 0.0, of: Promise::Point });
+        };
+        let corrected = corrected_m.filter(|corrected| as_it_is > goal_m && *corrected < as_it_is);
+        Some(match corrected {
+            Some(error_m) => Self { error_m, least_m: 0.0, of: Promise::ReachCorrected },
+            None => Self { error_m: as_it_is, least_m: 0.0, of: Promise::Reach },
+        })
+    }
+}
+
+impl Calibration {
+    /// How near a tool arrives, at points of the target where it was seen; `None` where the arm is not known, where views left out
+    /// contradict its errors, and where no error may be stated.
+    ///
+    /// What was found and the answer does not count on adds how far it would move the answer.
+    pub fn reach_errors(&self) -> Option<ReachErrors> {
+        self.reach.as_ref()?;
+        let at = self.joint.as_ref()?.reference_point;
+        Some(self.reach_at_target?.moved_by(self.stated.moved_m(&at)))
+    }
+
+    /// The error of a measured point where the camera saw the target by the poses that the robot reports, 95 %, metres: what images and
+    /// poses say of each other does not depend on where the arm really is.
+    pub fn error_by_poses_95_m(&self) -> Option<f64> {
+        let joint = self.joint.as_ref()?;
+        self.stated.error_95_m(self.hand_eye_covariance()?, joint.small_sample, &joint.reference_point)
+    }
+
+    /// Length of the tool of [`Self::reach_errors`], metres.
+    pub fn tool_length_m(&self) -> Option<f64> {
+        self.reach.as_ref().map(Reach::tool_length_m)
+    }
+
+    /// The error that a goal \[m\] is asked of, see [`Promised::of`]. In a box that of its worst point: of a tool with a camera beside the
+    /// arm, of a measured point with one on it. `None` where nothing may be stated, or the arm gets to no point of the box.
+    pub fn promised(&self, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Promised> {
+        let reach = match tool_box {
+            None => self.reach_errors(),
+            Some(tool_box) if self.reach.as_ref().is_some_and(Reach::stands_still) => Some(self.reach_in(tool_box)?),
+            Some(_) => None,
+        };
+        let point_m = match tool_box {
+            None => self.tip_error_95_m(),
+            Some(tool_box) => {
+                let errors = tool_box.corners_and_middle().map(|point| self.error_95_m(&point));
+                errors.into_iter().collect::<Option<Vec<f64>>>().and_then(|all| all.into_iter().reduce(f64::max))
+            }
+        };
+        let as_it_is_m = reach.map(|reach| reach.as_it_is_95_m);
+        let promised = Promised::of(goal_m, as_it_is_m, reach.and_then(|reach| reach.corrected_95_m), point_m)?;
+        let least_m = reach.map_or(0.0, |reach| match promised.of {
+            Promise::Point => 0.0,
+            Promise::Reach => reach.as_it_is_least_95_m,
+            Promise::ReachCorrected => reach.repeatability_95_m,
+        });
+        Some(Promised { least_m, ..promised })
+    }
+
+    /// How the distance that a tool arrives within by corrected commands turns with what is not known, see [`Reach::weight`]. `None` where the arm is not known or gets to too few points, and where no commands are
+    /// corrected.
+    pub fn reach_weight(&self, tool_box: Option<&TipBox>) -> Option<DMatrix<f64>> {
+        let points = tool_box.map(TipBox::corners_and_middle);
+        let reach = self.reach.as_ref().filter(|reach| points.is_none() || reach.stands_still())?;
+        self.reach_at_target?.corrected_95_m?;
+        reach.weight(points.as_ref().map(|points| &points[..]))
+    }
+
+    fn reach_in(&self, tool_box: &TipBox) -> Option<ReachErrors> {
+        let points = tool_box.corners_and_middle();
+        let moved_m = points.iter().map(|point| self.stated.moved_m(point)).fold(0.0, f64::max);
+        Some(self.reach.as_ref()?.at_points(&points)?.moved_by(moved_m))
+    }
+}
+
+/// The tool and the arm of a fit whose views are known; `None` where that gives no error of reach.
+pub(super) fn reach(fit: &Fit, of_views: &ArmOfViews, target: &TargetSpec) -> Option<Reach> {
+    let errors = fit.arm()?;
+    let placement = &of_views.placement;
+    let arm = CorrectedArm::new(placement.arm.clone(), errors)?;
+    let seen = fit.views.iter().zip(&of_views.joints_rad).filter_map(|(view, joints_rad)| {
+        let camera_from_target = view.camera_from_target.filter(|_| view.status == ViewStatus::Used)?;
+        Some(Seen { joints_rad: joints_rad.clone()?, camera_from_target })
+    });
+    let is_its_own = placement.arm_of_poses().is_some();
+    let tool = Vector3::from(of_views.tool_m);
+    Reach::new((&arm, errors), fit.hand_eye.as_ref()?, seen.collect(), target, &tool, is_its_own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_goal_is_asked_of_the_way_that_will_be_used() {
+        let of = |goal_m, as_it_is, corrected, point| {
+            Promised::of(goal_m, as_it_is, corrected, point).map(|promised| (promised.error_m, promised.of))
+        };
+        assert_eq!(of(1.0, Some(0.9), Some(0.1), Some(0.5)), Some((0.9, Promise::Reach)), "as it is it is good enough");
+        assert_eq!(of(0.8, Some(0.9), Some(0.1), Some(0.5)), Some((0.1, Promise::ReachCorrected)));
+        assert_eq!(of(0.8, Some(0.9), Some(1.1), Some(0.5)), Some((0.9, Promise::Reach)), "no correction helps");
+        assert_eq!(of(0.8, Some(0.9), None, Some(0.5)), Some((0.9, Promise::Reach)), "none is known");
+        assert_eq!(of(0.8, None, None, Some(0.5)), Some((0.5, Promise::Point)));
+        assert_eq!(of(0.8, None, None, None), None);
+    }
+}
