@@ -191,7 +191,7 @@ pub struct Wanted {
     pub method: Method,
     /// What is changed about it.
     pub options: Options,
-    /// The expected error (95 %) to reach, metres.
+    /// The error (95 %) to reach, metres.
     pub goal_m: f64,
     /// Where the tip of the tool is in the frame of the tip, metres, instead of where the folder has it.
     pub tool_m: Option<[f64; 3]>,

@@ -53,7 +53,7 @@ const TOUCH_SEED: u64 = 0x74_6f75_6368;
 pub const USUAL_TOOL_M: f64 = 0.1;
 
 /// A view of the session.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Seen {
     /// Joint values as reported, radians.
     pub joints_rad: Vec<f64>,
@@ -146,7 +146,7 @@ pub struct Reach {
     turns: Vec<UnitQuaternion<f64>>,
     /// Arms and cameras that the data allow.
     possible: Vec<Possible>,
-    /// The most probable of them, which repeats no better than any.
+    /// The most probable arm and camera, with what the arm does not repeat in each of them.
     repeated: Vec<Possible>,
     /// Whether commands are corrected.
     is_corrected: bool,

@@ -1,10 +1,10 @@
-//! Why a guided session goes on although its expected error is below the goal.
+//! Why a guided session goes on although its error is below the goal.
 
 use super::{Guide, IN_A_ROW, Known, LEAST_VIEWS};
 use handeye_wording::Text;
 use handeye_wording::text;
 
-/// What is missing although the expected error is below the goal.
+/// What is missing although the error is below the goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hold {
     /// Fewer than [`LEAST_VIEWS`] views.

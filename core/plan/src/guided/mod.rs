@@ -192,7 +192,8 @@ pub enum Ending {
         /// By what part of it.
         gain: f64,
     },
-    /// More views lower the error no further, or there are as many as allowed, and the arm does not repeat well enough for the goal.
+    /// More views lower the error no further, or there are as many as allowed, and what no view lowers is above the goal: what the arm
+    /// does not repeat, and what it is off where no commands are corrected.
     Repeatability {
         /// What is stated, and what of it no view lowers.
         promised: Promised,
@@ -553,12 +554,11 @@ impl Guide {
             return Next::End(reached.unwrap_or(Ending::NothingInReach { candidates: plan.candidates }));
         };
         let limit = self.repeatability();
+        let gain = 1.0 - lowered.with_m(plan.best_ratio) / lowered.now_m;
         // Where no view leads to the goal it is the error as a whole that has to be worth one.
-        let ratio = if limit.is_some() { lowered.with_m(plan.best_ratio) / lowered.now_m } else { plan.best_ratio };
-        let gain = 1.0 - ratio;
-        if views >= LEAST_VIEWS && gain < self.options.least_gain {
+        let worth = if limit.is_some() { gain } else { 1.0 - plan.best_ratio };
+        if views >= LEAST_VIEWS && worth < self.options.least_gain {
             let reached = self.reached_after_all(known, views).or(limit);
-            let gain = 1.0 - lowered.with_m(plan.best_ratio) / lowered.now_m;
             let ending = reached.unwrap_or(Ending::LittleToGain { gain });
             return Next::End(if self.is_sound(known.calibration) { ending } else { Ending::Doubted });
         }
@@ -573,7 +573,7 @@ impl Guide {
         (is_below && self.is_sound(known.calibration)).then_some(Ending::GoalReached { promised })
     }
 
-    /// Where the arm does not repeat well enough for the goal.
+    /// Where what no view lowers is above the goal.
     fn repeatability(&self) -> Option<Ending> {
         let promised = self.judged?.promised;
         (promised.least_m > self.options.goal_m).then_some(Ending::Repeatability { promised })

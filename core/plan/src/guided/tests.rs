@@ -69,7 +69,7 @@ fn an_arm_whose_links_are_off_reaches_the_goal_by_corrected_commands() {
         assert!(views <= 25, "{arm:?} {mode:?}: {views} views");
         told += run.steps.iter().filter(|step| matches!(step.why, Why::Gain { part: Part::Arm, .. })).count();
     }
-    assert!(told > 3, "{told} views were chosen for what they tell of the arm");
+    assert!(told > 3, "{told} views were chosen by the errors of the arm");
     // One in twenty; five of thirty by chance once in seventy.
     assert!(all >= 20 && beyond <= 4, "{beyond} of {all} touches are farther off than was promised");
 }

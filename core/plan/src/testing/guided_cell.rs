@@ -288,7 +288,11 @@ impl GuidedCell {
     }
 
     /// Captures at a tip pose that the robot reports, however it got there; whether the whole board was in the image.
+    ///
+    /// # Panics
+    /// With links that are off: where the tip really is depends on the joints.
     pub fn capture_at(&mut self, base_from_tip: &Pose<Base, Tip>) -> bool {
+        assert!(self.true_chain.is_none(), "the joints have to be known");
         let Some(view) = self.view(base_from_tip) else { return false };
         self.observations.views.push(view);
         self.joints_rad.push(None);

@@ -335,42 +335,47 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let (error_mm, goal) = (promised.error_m * 1e3, shown(goal_mm, 3));
     let is_reached = error_mm <= goal_mm;
     let error = shown(error_mm, 3);
-    let text = match (promised.of, is_reached) {
-        (Promise::Point, true) => text!(
+    let (advice, advised) = match promised.of {
+        _ if is_reached => (None, None),
+        Promise::Point => towards_goal(calibration, goal_mm).map(|(advice, advised)| (Some(advice), advised))?,
+        Promise::Reach | Promise::ReachCorrected => (Some(towards_reach(calibration, &promised, goal_mm)), None),
+    };
+    let text = match (promised.of, advice) {
+        (Promise::Point, None) => text!(
             "Good enough: the expected error of {error} mm (95 %) is below the goal of {goal} mm. Verify with captures that \
              were not in the fit.",
             error = error,
             goal = goal
         ),
-        (Promise::Reach, true) => text!(
+        (Promise::Reach, None) => text!(
             "Good enough: a tool arrives within {error} mm (95 %), below the goal of {goal} mm. Verify with captures that were not in \
              the fit.",
             error = error,
             goal = goal
         ),
-        (Promise::ReachCorrected, true) => text!(
+        (Promise::ReachCorrected, None) => text!(
             "Good enough with corrected commands: with them a tool arrives within {error} mm (95 %), below the goal of {goal} mm. Correct \
              the commands by the errors of the arm, for which `handeye correct` makes the table.",
             error = error,
             goal = goal
         ),
-        (Promise::Point, false) => text!(
+        (Promise::Point, Some(advice)) => text!(
             "The expected error of {error} mm (95 %) is above the goal of {goal} mm. {advice}",
             error = error,
             goal = goal,
-            advice = towards_goal(calibration, goal_mm)?.0
+            advice = advice
         ),
-        (Promise::Reach, false) => text!(
+        (Promise::Reach, Some(advice)) => text!(
             "A tool arrives within {error} mm (95 %), and the goal is {goal} mm. {advice}",
             error = error,
             goal = goal,
-            advice = towards_reach(calibration, &promised, goal_mm)
+            advice = advice
         ),
-        (Promise::ReachCorrected, false) => text!(
+        (Promise::ReachCorrected, Some(advice)) => text!(
             "Even with corrected commands a tool arrives within {error} mm (95 %), and the goal is {goal} mm. {advice}",
             error = error,
             goal = goal,
-            advice = towards_reach(calibration, &promised, goal_mm)
+            advice = advice
         ),
     };
     let (code, severity) = if is_reached {
@@ -381,14 +386,12 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let finding =
         Finding::new(code, severity, text).with("expected_error_95", calibration.tip_error_95_m()? * 1e3, "mm");
     let finding = finding.with("goal", goal_mm, "mm");
-    let (reach, of_point) = (calibration.reach_errors(), promised.of == Promise::Point && !is_reached);
-    let numbers = reach.into_iter().flat_map(|reach| {
+    let numbers = calibration.reach_errors().into_iter().flat_map(|reach| {
         let corrected = reach.corrected_95_m.map(|metres| ("reach_error_corrected_95", metres));
         let repeatability = ("repeatability_95", reach.repeatability_95_m);
         [Some(("reach_error_95", reach.as_it_is_95_m)), corrected, Some(repeatability)]
     });
     let finding = numbers.flatten().fold(finding, |finding, (name, metres)| finding.with(name, metres * 1e3, "mm"));
-    let advised = if of_point { towards_goal(calibration, goal_mm)?.1 } else { None };
     Some(advised.into_iter().fold(finding, |finding, (name, value, unit)| finding.with(name, value, unit)))
 }
 

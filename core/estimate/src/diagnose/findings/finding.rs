@@ -96,9 +96,9 @@ pub enum FindingCode {
     DepthError,
     /// The closed forms do not agree.
     ClosedFormsDisagree,
-    /// The expected error is below the goal.
+    /// The error that the goal is asked of is below it.
     GoalReached,
-    /// The expected error is above the goal.
+    /// The error that the goal is asked of is above it.
     GoalNotReached,
 }
 

@@ -1,12 +1,24 @@
 use super::*;
 use crate::handeye::joint::normal::System;
 use crate::handeye::joint::state::State;
-use crate::handeye::joint::{JointProblem, estimate};
+use crate::handeye::joint::{JointProblem, JointStart, estimate};
 use crate::test_sessions::Estimated as _;
 use crate::{Method, fit};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::testing::BOARD;
 use handeye_simulate::session::{ArmError, REALISTIC, Setup, add_field, camera, session, trial};
+
+/// Where the estimator is when it is at the model.
+fn state_of(model: &ViewModel, problem: &JointProblem<'_>) -> State {
+    let start = JointStart {
+        mount_from_camera: model.hand_eye.mount_from_camera(),
+        anchor_from_target: model.hand_eye.anchor_from_target(),
+        intrinsics: model.intrinsics,
+        shape: model.shape,
+        noise: None,
+    };
+    State { field: model.field.clone(), arm: model.arm.clone(), ..State::new(problem, &start) }
+}
 
 /// The information of views by the rows is that of the estimator's own equations, view by view.
 #[test]
@@ -33,17 +45,7 @@ fn what_views_are_expected_to_say_is_what_the_estimator_takes_from_them() {
             noise: Some(*model.noise()),
             ..JointProblem::new(mode, &trial.board, &trial.views)
         };
-        let mut state = State::new(
-            &problem,
-            &crate::handeye::joint::JointStart {
-                mount_from_camera: model.hand_eye.mount_from_camera(),
-                anchor_from_target: model.hand_eye.anchor_from_target(),
-                intrinsics: model.intrinsics,
-                shape: model.shape,
-                noise: None,
-            },
-        );
-        state.field.clone_from(&model.field);
+        let state = state_of(&model, &problem);
         let system = System::new(&problem, &state, &CancelToken::default()).expect("in front of the camera");
         for (view, block) in trial.views.iter().zip(&system.blocks) {
             let (expected, _) = block.information(model.noise(), &Vector6::zeros()).expect("it determines a pose");
@@ -74,18 +76,7 @@ fn what_views_say_of_an_arm_is_what_the_estimator_takes_from_them() {
             noise: Some(*model.noise()),
             ..JointProblem::new(mode, &board, &session.views)
         };
-        let mut state = State::new(
-            &known,
-            &crate::handeye::joint::JointStart {
-                mount_from_camera: model.hand_eye.mount_from_camera(),
-                anchor_from_target: model.hand_eye.anchor_from_target(),
-                intrinsics: model.intrinsics,
-                shape: model.shape,
-                noise: None,
-            },
-        );
-        state.field.clone_from(&model.field);
-        state.arm.clone_from(&model.arm);
+        let state = state_of(&model, &known);
         let system = System::new(&known, &state, &cancel).expect("in front of the camera");
         for (view, block) in session.views.iter().zip(&system.blocks) {
             let (expected, _) = block.information(model.noise(), &Vector6::zeros()).expect("it determines a pose");
