@@ -1,4 +1,5 @@
-//! `journal.jsonl`: everything that was ever done to a session, one line per entry, only ever appended to.
+//! `journal.jsonl`: everything that was ever done to a session, one line per entry, only ever appended to; before the first capture it
+//! may begin again, with a higher number, see [`Store::begin_again`](super::Store::begin_again).
 //!
 //! ```text
 //! {"seq":1,"entry":{"begin":{…}},"sha256":"0123456789abcdef"}
@@ -285,6 +286,11 @@ impl Journal {
         let mut bytes = std::fs::read(&self.path).map_err(|e| SessionError::unreadable(&self.path, &e))?;
         bytes.truncate(usize::try_from(self.length).unwrap_or(usize::MAX));
         Ok(bytes)
+    }
+
+    /// Takes no more entries.
+    pub fn give_up(&mut self) {
+        self.is_broken = true;
     }
 
     pub fn prepare(&self, entry: &Entry) -> Result<Prepared, SessionError> {

@@ -2,6 +2,7 @@
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use super::error::{SessionError, SessionProblem};
 use handeye_files::own_folder;
@@ -9,6 +10,11 @@ use handeye_files::own_folder;
 /// The file that is locked. It stays when the session is closed: removing it would let two programs lock two files of
 /// the same name.
 pub(super) const LOCK: &str = ".lock";
+
+/// For how long a lock is waited for. Starting a program takes milliseconds.
+const WAIT: Duration = Duration::from_millis(300);
+/// Between two looks at it.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// The right to write a folder. The operating system takes it back when the process ends, however it ends.
 #[derive(Debug)]
@@ -26,10 +32,15 @@ impl FolderLock {
         let unwritable = |e| SessionError::unwritable(&path, &e);
         own_folder::check_file(&path).map_err(unwritable)?;
         let file = File::options().create(true).truncate(false).write(true).open(&path).map_err(unwritable)?;
-        match file.try_lock() {
-            Ok(()) => Ok(Self { _file: file }),
-            Err(TryLockError::WouldBlock) => Err(SessionError::new(folder, SessionProblem::Locked)),
-            Err(TryLockError::Error(e)) => Err(unwritable(e)),
+        let began = Instant::now();
+        loop {
+            match file.try_lock() {
+                Ok(()) => return Ok(Self { _file: file }),
+                // A program that is being started by this one holds all of its files for a moment, a lock that was let go among them.
+                Err(TryLockError::WouldBlock) if began.elapsed() < WAIT => std::thread::sleep(LOOK),
+                Err(TryLockError::WouldBlock) => return Err(SessionError::new(folder, SessionProblem::Locked)),
+                Err(TryLockError::Error(e)) => return Err(unwritable(e)),
+            }
         }
     }
 }

@@ -146,6 +146,33 @@ impl Store {
         self.commit(Entry::Edit(edit))
     }
 
+    /// Begins the session again with another document, as long as no capture was ever in it; whether it did. What was changed before
+    /// can then no longer be undone.
+    ///
+    /// # Errors
+    /// As [`Self::create_with`] for the document, and [`Self::apply`] for the disk; nothing more is written then until the session is
+    /// opened again.
+    pub fn begin_again(&mut self, document: Document) -> Result<bool, SessionError> {
+        let is_empty = self.history.last_capture() == CaptureId(0) && document.captures.is_empty();
+        if !is_empty || **self.document() == document {
+            return Ok(false);
+        }
+        let history = History::new(document);
+        history.document().check().map_err(|e| SessionError::new(&self.folder, e.into()))?;
+        let sequence = self.journal.sequence() + 1;
+        self.journal = match Journal::create(&self.folder, &history, sequence) {
+            Ok(journal) => journal,
+            Err(error) => {
+                // The one that is open may no longer be that of the folder.
+                self.journal.give_up();
+                return Err(error);
+            }
+        };
+        self.history = history;
+        self.derived.update(&self.folder, &self.history, self.journal.sequence())?;
+        Ok(true)
+    }
+
     /// Takes the last change back.
     ///
     /// # Errors

@@ -54,6 +54,32 @@ fn what_was_done_and_undone_is_there_after_closing() {
 }
 
 #[test]
+fn a_session_begins_again_until_the_first_capture_was_in_it() {
+    let dir = folder();
+    let mut store = store_with(dir.path(), 0);
+    let other = |store: &Store| {
+        let mut document = (**store.document()).clone();
+        document.meta.created.push('!');
+        document
+    };
+    let document = other(&store);
+    assert!(store.begin_again(document.clone()).expect("begin again"));
+    assert!(!store.begin_again(document.clone()).expect("the same"));
+    let sequence = store.sequence();
+    drop(store);
+    let mut store = Store::open(dir.path()).expect("open");
+    assert_eq!((&**store.document(), store.sequence()), (&document, sequence));
+
+    store.add_capture(&Capture::new(&image(1), pose(1))).expect("add");
+    store.apply(delete(1)).expect("delete");
+    let before = content(dir.path());
+    let document = other(&store);
+    assert!(!store.begin_again(document).expect("it had a capture"));
+    assert_eq!(content(dir.path()), before);
+    store.undo().expect("the capture comes back");
+}
+
+#[test]
 fn create_never_replaces_anything() {
     let home = folder();
     let session = home.path().join("session");

@@ -21,6 +21,7 @@ use crate::model::{
     JobId, Jog, Link, LinkState, LiveDetection, Motion, MotionGoal, MotionOutcome, Pane, PoseSequence, RefusalKind,
     RobotState, SceneView, SolveStatus, StopOutcome, ThemeChoice, WorkBox,
 };
+use crate::session::start;
 use crate::solve::update::seen;
 use crate::testing::sample;
 use crate::text::{Language, Text};
@@ -596,6 +597,41 @@ fn the_view_in_3d_is_fitted_to_every_cell_once_and_then_left_as_a_person_turned_
     let second = bench.app.model().scene;
     assert_eq!(Some(second), crate::scene::fitted_view(bench.app.model()));
     assert!(second != turned && second != first, "{second:?}");
+}
+
+#[test]
+fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
+    // The cell says nothing by itself.
+    let (cell, release) = FakeCell::that_never_answers();
+    let mut bench = bench(&cell);
+    let folder = bench._sessions.path().join("named");
+    let deadline = Instant::now() + Duration::from_mins(1);
+    let until = |app: &mut App, is_so: &dyn Fn(&Model) -> bool| {
+        while !is_so(app.model()) {
+            assert!(Instant::now() < deadline, "{}", reported(app));
+            app.collect();
+            std::thread::yield_now();
+        }
+    };
+    open_or_begin(&mut bench.app.cx.model, &bench.app.cx.desk, folder.clone());
+    until(&mut bench.app, &|model| model.session.folder.is_some());
+    bench.app.apply(session::Command::SetMode(Mode::EyeToHand));
+    let known = sample::connected().cell.expect("connected");
+    let panda = ShippedScene::Panda.scene().and_then(|scene| scene.resolve(0)).expect("it is shipped");
+    let panda = Some(ArmKinematics::new(panda.arm.clone(), panda.world_from_arm));
+    let undecided = CellFacts { arm: None, arm_doubt: Some(ArmDoubt::Open), ..known.clone() };
+    for facts in [known.clone(), CellFacts { arm: panda, ..known }] {
+        let arm = start::arm(facts.arm.as_ref());
+        assert!(arm.is_some());
+        bench.app.absorb(connect::Event::Cell(Box::new(facts)));
+        until(&mut bench.app, &|model| model.document().meta.arm == arm);
+        bench.app.absorb(connect::Event::Cell(Box::new(undecided.clone())));
+    }
+    let state = |app: &App| app.model().document().meta.clone();
+    let kept = state(&bench.app);
+    let meta = &handeye_session::Session::open(&folder).expect("a session").document.meta;
+    assert_eq!((&kept, meta.mode), (meta, Mode::EyeToHand));
+    drop(release);
 }
 
 fn sample_robot() -> RobotState {

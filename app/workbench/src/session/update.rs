@@ -12,7 +12,7 @@ use super::command::{Command, Event};
 use crate::app::{Context, Numbers, Reach, bounds_of};
 use crate::guided::update::forget_guided;
 use crate::model::{
-    CapturePurpose, Dialog, FrameImages, Model, Observed, RecentSession, Review, SessionState, Severity,
+    ArmDoubt, CapturePurpose, Dialog, FrameImages, Model, Observed, RecentSession, Review, SessionState, Severity,
 };
 use crate::session::start;
 use crate::shell::update::set_dialog;
@@ -79,9 +79,11 @@ fn beginning(model: &Model) -> Box<Beginning> {
     Box::new(Beginning { meta, taught })
 }
 
-/// Says what a session begins with while there is none on the disk.
+/// Says what a session begins with while nothing was captured in it.
 pub(crate) fn prepare_session(model: &mut Model, desk: &SessionThreads) {
-    if model.session.folder.is_none() {
+    // An arm that may still turn out to be known is not yet an arm that is not.
+    let is_settled = model.cell.as_ref().is_some_and(|cell| !matches!(cell.arm_doubt, Some(ArmDoubt::Open)));
+    if model.session.folder.is_none() || is_settled {
         ask_archive(model, desk, ArchiveTask::Prepare(beginning(model)));
     }
 }

@@ -34,10 +34,22 @@ pub struct Beginning {
     pub taught: Vec<TaughtPose>,
 }
 
+impl Beginning {
+    /// A session without captures, with what is known of the cell here.
+    fn within(&self, document: &Document) -> Document {
+        let mut document = document.clone();
+        document.meta.arm.clone_from(&self.meta.arm);
+        document.meta.joint_kinds.clone_from(&self.meta.joint_kinds);
+        document.meta.ground_truth.clone_from(&self.meta.ground_truth);
+        document
+    }
+}
+
 /// What the archive can be asked for.
 #[derive(Debug)]
 pub enum ArchiveTask {
-    /// What a session begins with when the first change asks for one.
+    /// What a session begins with when the first change asks for one. One that was begun here, or of whose cell nothing is known, takes on
+    /// the cell as long as nothing was captured in it.
     Prepare(Box<Beginning>),
     /// Begin a session in a folder; without one, under the folder of sessions.
     New {
@@ -94,12 +106,14 @@ pub struct Archive {
     sessions: PathBuf,
     beginning: Option<Beginning>,
     store: Option<Store>,
+    /// Whether the session that is open was begun by this program, and not opened.
+    is_begun_here: bool,
 }
 
 impl Archive {
     /// Nothing is written before the first change. New sessions go under `sessions`.
     pub fn new(sessions: PathBuf, outlet: Outlet) -> Self {
-        Self { outlet, sessions, beginning: None, store: None }
+        Self { outlet, sessions, beginning: None, store: None, is_begun_here: false }
     }
 
     /// Works until both channels are closed. What was handed in before that is still written.
@@ -127,9 +141,9 @@ impl Archive {
     fn perform(&mut self, task: ArchiveTask) {
         match task {
             ArchiveTask::Prepare(beginning) => {
-                let draft = self.store.is_none();
+                self.take_on(&beginning);
                 self.beginning = Some(*beginning);
-                if draft {
+                if self.store.is_none() {
                     self.report_document();
                 }
             }
@@ -151,6 +165,17 @@ impl Archive {
             ArchiveTask::Redo => self.change(Store::redo),
             ArchiveTask::Result { folder, result } => self.keep_result(&folder, *result),
             ArchiveTask::Guided { folder, record } => self.keep_guided(&folder, &record),
+        }
+    }
+
+    /// Nobody's capture is of another cell, and what a person said of target, mode and poses stays.
+    fn take_on(&mut self, beginning: &Beginning) {
+        let Some(document) = self.store.as_ref().map(Store::document) else { return };
+        let meta = &document.meta;
+        let is_unknown = meta.arm.is_none() && meta.joint_kinds.is_none() && meta.ground_truth.is_none();
+        if self.is_begun_here || is_unknown {
+            let of_cell = beginning.within(document);
+            self.change(|store| store.begin_again(of_cell));
         }
     }
 
@@ -177,7 +202,9 @@ impl Archive {
     fn begin(&mut self, folder: Option<PathBuf>, beginning: Beginning) {
         self.beginning = Some(beginning);
         let created = self.create(folder);
+        let is_created = created.is_ok();
         self.take(created, |error| text!("The session could not be created: {error}", error = error));
+        self.is_begun_here |= is_created;
     }
 
     /// A session for what there is to keep.
@@ -198,6 +225,7 @@ impl Archive {
             store
         } else {
             let store = self.create(None)?;
+            self.is_begun_here = true;
             self.outlet.notice(Severity::Info, text!("New session in {folder}", folder = store.folder().display()));
             store
         };
@@ -210,6 +238,7 @@ impl Archive {
             Ok(store) => {
                 let exported = exported::is_exported(store.folder());
                 self.store = Some(store);
+                self.is_begun_here = false;
                 self.report_document();
                 self.outlet.report(session::Event::Opened { exported });
             }
