@@ -511,6 +511,8 @@ def the_errors_of_the_arm_are_found_and_its_commands_arrive(rng):
     assert 0.02 < arm.levels.angle_deg < 0.5 and 0.05 < arm.levels.length_mm < 1.5
     assert arm.reach_error_corrected_95_mm < 0.5 * arm.reach_error_95_mm
     assert arm.hand_eye_covariance.shape == arm.target_covariance.shape == (6, 6)
+    # The lens that goes with the hand-eye of the arm; a lens that was given is one and the same.
+    assert arm.intrinsics is not None and (arm.intrinsics.fx == result.intrinsics.fx) == (arm.intrinsics.sigma is None)
     # Where the board is seen in views that the calibration does not have, by corrected poses and by reported ones.
     middle = np.array([*POINTS.mean(axis=0), 1.0])
 

@@ -426,6 +426,7 @@ mod tests {
             CommandKind::Taught(Taught::Reorder),
             CommandKind::Track(Track::HideBoard),
             CommandKind::Track(Track::MoveBoard),
+            CommandKind::Track(Track::SetCorrected),
         ]
     };
 

@@ -593,7 +593,7 @@ fn exports_of_the_captures_that_are_there_are_done_and_others_are_not() {
     let mut state = silent.app().model().session.clone();
     let mut document = (*state.document).clone();
     document.captures[0].excluded = true;
-    state.document = Arc::new(document);
+    state.document = std::sync::Arc::new(document);
     silent.absorb(session::Event::Document(Box::new(state)));
     assert!(!silent.app().model().export.is_present, "another answer comes of these captures");
 }

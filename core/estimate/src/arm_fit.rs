@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix6};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
+use crate::ShapeEstimate;
 use crate::handeye::joint::{
     self, ArmErrors, Free, JointProblem, JointSolution, Noise, PoseDependentError, SIZE_SIGMA, SmallSample,
 };
@@ -14,6 +15,7 @@ use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::progress::Work;
 use handeye_geometry::se3;
 use handeye_geometry::targets::bent::BoardShape;
+use handeye_geometry::view_equations::DepthBias;
 
 /// The errors of the robot's arm as the views show them, and the calibration by the tip poses that they make. Both transforms are
 /// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
@@ -25,8 +27,7 @@ pub struct ArmFit {
     pub hand_eye: HandEye,
     /// What was estimated beside them.
     pub beside: BesideArm,
-    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right
-    /// perturbations. The uncertainty of the lens and of everything else that is estimated is in it.
+    /// Covariance of both links, everything beside and, at its end, the errors of the arm, as in [`JointSolution::covariance`].
     pub covariance: DMatrix<f64>,
     /// How the error of the hand-eye transform is distributed in units of that.
     pub small_sample: SmallSample,
@@ -49,6 +50,8 @@ pub struct BesideArm {
     pub shape: BoardShape,
     /// Errors that depend on where the robot stands and that its arm does not explain; `None` when they were not estimated.
     pub field: Option<PoseDependentError>,
+    /// Errors of the depths; none where they were not estimated.
+    pub depth: DepthBias,
     /// What of all that was free.
     pub free: Free,
 }
@@ -58,9 +61,49 @@ pub struct BesideArm {
 const SIZE_GAIN: f64 = 6.63;
 
 impl ArmFit {
+    /// Covariance of the errors, in the order of [`arm_parameters`](joint::arm_parameters).
+    pub fn errors_covariance(&self) -> DMatrix<f64> {
+        let (count, first) = self.error_places();
+        self.covariance.view((first, first), (count, count)).into_owned()
+    }
+
+    /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right perturbations. The
+    /// uncertainty of the lens and of everything else that is estimated is in it.
+    pub fn links_and_errors_covariance(&self) -> DMatrix<f64> {
+        let (count, first) = self.error_places();
+        let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
+        self.covariance.select_rows(&kept).select_columns(&kept)
+    }
+
+    /// How many errors there are, and where they begin in the covariance.
+    fn error_places(&self) -> (usize, usize) {
+        let count = self.errors.values().len();
+        (count, self.covariance.nrows() - count)
+    }
+
     /// Standard deviations of the errors, in the order of [`arm_parameters`](joint::arm_parameters).
     pub fn sigma(&self) -> Vec<f64> {
-        (12..self.covariance.nrows()).map(|i| self.covariance[(i, i)].max(0.0).sqrt()).collect()
+        self.errors_covariance().diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect()
+    }
+
+    /// Standard deviations of the lens that goes with them, in the order of [`Intrinsics::parameters`]; empty when it was given.
+    pub fn intrinsics_sigma(&self) -> Vec<f64> {
+        let lens = 12..12 + self.beside.free.form().warp_at(&self.beside.intrinsics);
+        lens.map(|i| self.deviation(i)).collect()
+    }
+
+    /// The shape of the target that goes with them; `None` when it was given.
+    pub fn shape(&self) -> Option<ShapeEstimate> {
+        let BesideArm { intrinsics, shape, free, .. } = &self.beside;
+        let form = free.form();
+        let warp = 12 + form.warp_at(intrinsics);
+        let scale_sigma = free.scale.then(|| self.deviation(12 + form.scale_at(intrinsics)));
+        let warp_sigma_m = free.warp.then(|| [self.deviation(warp), self.deviation(warp + 1)]);
+        (free.warp || free.scale).then_some(ShapeEstimate { shape: *shape, warp_sigma_m, scale_sigma })
+    }
+
+    fn deviation(&self, index: usize) -> f64 {
+        self.covariance[(index, index)].max(0.0).sqrt()
     }
 
     /// What it says of both links of a calibration by reported poses, which knows nothing of the arm's errors: the camera on its mount,
@@ -125,15 +168,18 @@ pub(crate) fn arm_fit(
             })
         }
     };
-    let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, field: fit.field.clone(), free: fit.free };
-    let count = errors.values().len();
-    let first = fit.covariance.nrows() - count;
-    let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
+    let beside = BesideArm {
+        intrinsics: fit.intrinsics,
+        shape: fit.shape,
+        field: fit.field.clone(),
+        depth: fit.depth,
+        free: fit.free,
+    };
     Ok(Some(ArmFit {
         errors,
         hand_eye: fit.hand_eye,
         beside,
-        covariance: fit.covariance.select_rows(&kept).select_columns(&kept),
+        covariance: fit.covariance,
         small_sample: fit.small_sample,
         noise: fit.noise,
         heldout_px: heldout.map(|heldout| [heldout.before_px, heldout.after_px]),

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector6};
 
 use crate::arm_fit::ArmFit;
 use crate::handeye::joint::{ArmErrors, SmallSample};
+use crate::verify::TipAt;
 use handeye_arm::{Arm, ArmError, IkError, JointRange};
 use handeye_geometry::frames::{Base, Pose, Tip};
 
@@ -66,11 +67,10 @@ impl CorrectedArm {
     /// That of a calibration, with the arm where it stands, see [`place`](crate::placement::place); `None` where it is of an arm with
     /// another number of joints.
     pub fn new(arm: Arm, fit: &ArmFit) -> Option<Self> {
-        let count = fit.errors.values().len();
         (arm.joint_count() == fit.errors.joint_count()).then(|| Self {
             arm,
             errors: fit.errors.clone(),
-            covariance: fit.covariance.view((12, 12), (count, count)).into_owned(),
+            covariance: fit.errors_covariance(),
             unexplained: (fit.noise.robot_m, fit.noise.robot_rad),
             small_sample: fit.small_sample,
         })
@@ -84,6 +84,17 @@ impl CorrectedArm {
         let reported = self.arm.forward(joints_rad)?;
         let frames = self.arm.tip_from_joints(&reported, joints_rad)?;
         Ok(Pose::from_isometry(reported.isometry() * self.errors.reported_from_true(&reported, &frames)))
+    }
+
+    /// The same with how it turns with the errors.
+    ///
+    /// # Errors
+    /// As [`Arm::forward`].
+    pub fn tip_at(&self, joints_rad: &[f64]) -> Result<TipAt, ArmError> {
+        let reported = self.arm.forward(joints_rad)?;
+        let tip = self.errors.true_tip(&reported, &self.arm.tip_from_joints(&reported, joints_rad)?);
+        let base_from_tip = Pose::from_isometry(reported.isometry() * tip.reported_from_true);
+        Ok(TipAt { base_from_tip, by_errors: tip.by_errors })
     }
 
     /// The chain with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what the joints give way
@@ -117,9 +128,7 @@ impl CorrectedArm {
     /// # Errors
     /// As [`Arm::forward`].
     pub fn tip_covariance(&self, joints_rad: &[f64]) -> Result<Matrix6<f64>, ArmError> {
-        let reported = self.arm.forward(joints_rad)?;
-        let frames = self.arm.tip_from_joints(&reported, joints_rad)?;
-        let by_errors = self.errors.true_tip(&reported, &frames).by_errors;
+        let by_errors = self.tip_at(joints_rad)?.by_errors;
         let known = &by_errors * &self.covariance * by_errors.transpose();
         let (m, rad) = (self.unexplained.0.powi(2), self.unexplained.1.powi(2));
         let unexplained = Matrix6::from_diagonal(&Vector6::new(m, m, m, rad, rad, rad));

@@ -404,8 +404,9 @@ struct Possible {
 
 /// Drawn from what a fit leaves open; `None` for a covariance that is none.
 fn possible(fit: &ArmFit, random: &mut Draw) -> Option<Vec<Possible>> {
-    let root = Cholesky::new(fit.covariance.clone())?.l();
-    let count = fit.covariance.nrows();
+    let covariance = fit.links_and_errors_covariance();
+    let count = covariance.nrows();
+    let root = Cholesky::new(covariance)?.l();
     // As good as infinite.
     let freedom = fit.small_sample.degrees_of_freedom.min(1e4);
     let law = ChiSquared::new(freedom).ok()?;

@@ -39,7 +39,7 @@ impl CorrectedChain {
 pub(super) fn about_arm(input: &ExportInput<'_>, [base, tip]: [&str; 2], rotation: &str) -> String {
     format!(
         "T_{base}_{tip} of the corrected arm, from what its joints report. Metres; {rotation}. Compliance under gravity is not in it. \
-         It belongs to the hand-eye of arm in the result JSON, not to the plain one. {}",
+         It belongs to hand-eye and intrinsics of arm in the result JSON, not to the plain ones. {}",
         made_by(input.result)
     )
 }

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, Matrix6};
 use serde::{Deserialize, Serialize};
 
-use super::TransformEstimate;
 use super::check::{BadResult, Checked, all_finite, not_negative, require};
+use super::{BoardEstimate, IntrinsicsEstimate, TransformEstimate};
 use handeye_arm::Arm;
 use handeye_estimate::ArmFit;
 use handeye_estimate::corrected_arm::CorrectedArm;
@@ -29,6 +29,13 @@ pub struct ArmEstimate {
     pub hand_eye: TransformEstimate,
     /// The target, likewise.
     pub target: TransformEstimate,
+    /// The camera that goes with `hand_eye`: estimated with the arm it is another one than by reported poses. Results before this was
+    /// written have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics: Option<IntrinsicsEstimate>,
+    /// The target's shape that goes with them, where it was estimated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub board: Option<BoardEstimate>,
     /// Covariance of the errors, radians and metres: for the joints in their order all `tilt` (x, y) and `zero`, then all `shift`
     /// (x, y), then all `compliance`; what is null in `joints` is left out.
     pub covariance: Vec<Vec<f64>>,
@@ -151,8 +158,10 @@ impl ArmEstimate {
         }
         let block = |at: usize| -> Matrix6<f64> { fit.covariance.fixed_view::<6, 6>(at, at).into_owned() };
         let (hand_eye, target) = TransformEstimate::of_links(&fit.hand_eye, Some(&block(0)), Some(&block(6)));
-        let count = fit.errors.values().len();
-        let row = |i: usize| (0..count).map(|j| fit.covariance[(12 + i, 12 + j)]).collect();
+        let of_errors = fit.errors_covariance();
+        let lens_sigma = fit.intrinsics_sigma();
+        let sigma = lens_sigma.first_chunk().copied();
+        let intrinsics = IntrinsicsEstimate::new(&fit.beside.intrinsics, sigma, lens_sigma.is_empty());
         Some(Self {
             chain: chain.clone(),
             tool_m,
@@ -168,7 +177,9 @@ impl ArmEstimate {
             },
             hand_eye,
             target,
-            covariance: (0..count).map(row).collect(),
+            intrinsics: Some(intrinsics),
+            board: fit.shape().map(BoardEstimate::from),
+            covariance: of_errors.row_iter().map(|row| row.iter().copied().collect()).collect(),
             degrees_of_freedom: Some(fit.small_sample.degrees_of_freedom).filter(|value| value.is_finite()),
             region_scale: fit.small_sample.scale,
             heldout_px: fit.heldout_px.map(|[reported, corrected]| HeldOutByArm { reported, corrected }),
@@ -206,6 +217,8 @@ impl ArmEstimate {
         let parameters = arm_parameters(self.chain.joint_count());
         require(self.joints.len() == self.chain.joint_count(), "arm.joints", "must be as many as those of the chain")?;
         all_finite(&self.tool_m, "arm.tool_m")?;
+        self.intrinsics.as_ref().map_or(Ok(()), |intrinsics| intrinsics.check("arm.intrinsics"))?;
+        self.board.as_ref().map_or(Ok(()), |board| board.check("arm.board"))?;
         for parameter in &parameters {
             let value = value_of(&self.joints[parameter.joint], parameter.error);
             require(value.is_some_and(f64::is_finite), "arm.joints", "must have a number for all but the first joint")?;
@@ -252,6 +265,8 @@ mod tests {
             assert!((a - b).abs() < 1e-15, "{a} {b}");
         }
         assert_eq!(here.covariance, there.covariance);
+        let lens = read.intrinsics.as_ref().and_then(IntrinsicsEstimate::intrinsics);
+        assert_eq!(lens, Some(fit.beside.intrinsics), "the lens that goes with its hand-eye");
         let joints = [0.1, -1.2, 1.4, -1.8, -1.6, 0.2];
         let (a, b) = (here.error_95_m(&joints).expect("six"), there.error_95_m(&joints).expect("six"));
         assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");

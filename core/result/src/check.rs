@@ -1,7 +1,7 @@
 //! What the types of a result do not say: finite, unit length, the frames of the mode.
 
 use super::{
-    CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, PrintEstimate,
+    BoardEstimate, CalibrationResult, EstimateDetails, FORMAT, IntrinsicsEstimate, MethodStatus, PrintEstimate,
     ResidualDistortionEstimate, TransformEstimate, VERSION,
 };
 use handeye_estimate::handeye::Mode;
@@ -54,7 +54,7 @@ impl CalibrationResult {
         require(self.version == VERSION, "version", "is not the one that is written here")?;
         self.check_links()?;
         if let Some(intrinsics) = &self.intrinsics {
-            intrinsics.check()?;
+            intrinsics.check("intrinsics")?;
         }
         if let Some(arm) = &self.arm {
             arm.check()?;
@@ -95,7 +95,8 @@ impl CalibrationResult {
             ("quality.robot_sigma_mm", q.robot_sigma_mm),
             ("quality.robot_sigma_deg", q.robot_sigma_deg),
         ];
-        if let Some(verification) = &self.verification {
+        let corrected = self.verification.as_ref().and_then(|verification| verification.corrected.as_deref());
+        for verification in self.verification.iter().chain(corrected) {
             numbers.push(("verification.rms_px", Some(verification.rms_px)));
             numbers.push(("verification.centre_rms_mm", Some(verification.centre_rms_mm)));
             numbers.push(("verification.orientation_rms_deg", Some(verification.orientation_rms_deg)));
@@ -155,9 +156,7 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
         require(of_lens, "estimate.widening.lens_factor", "must be at least 1")?;
     }
     if let Some(board) = &estimate.board {
-        all_finite(&board.warp_mm, "estimate.board.warp_mm")?;
-        require(board.scale > 0.0, "estimate.board.scale", "must be positive")?;
-        not_negative(board.scale_sigma, "estimate.board.scale_sigma")?;
+        board.check("estimate.board")?;
     }
     if let Some(size) = &estimate.target_size {
         require(size.true_over_stated > 0.0, "estimate.target_size.true_over_stated", "must be positive")?;
@@ -217,17 +216,24 @@ impl TransformEstimate {
     }
 }
 
+impl BoardEstimate {
+    pub(super) fn check(&self, at: &str) -> Checked {
+        all_finite(&self.warp_mm, &format!("{at}.warp_mm"))?;
+        require(self.scale > 0.0, format!("{at}.scale"), "must be positive")?;
+        not_negative(self.scale_sigma, &format!("{at}.scale_sigma"))
+    }
+}
+
 impl IntrinsicsEstimate {
-    fn check(&self) -> Checked {
-        let intrinsics = self.intrinsics();
-        let model = "intrinsics.model";
-        let intrinsics = intrinsics.ok_or(BadResult {
-            at: model.into(),
+    pub(super) fn check(&self, at: &str) -> Checked {
+        let intrinsics = self.intrinsics().ok_or_else(|| BadResult {
+            at: format!("{at}.model"),
             problem: "is not none (0 coefficients), brown_conrady (5), rational (8) or fisheye (4)",
         })?;
         let problem = "must be finite numbers, sizes and focal lengths positive";
-        require(intrinsics.validate().is_ok(), "intrinsics", problem)?;
+        require(intrinsics.validate().is_ok(), at, problem)?;
         let sigma = &self.sigma;
-        [sigma.fx, sigma.fy, sigma.cx, sigma.cy].into_iter().try_for_each(|s| not_negative(s, "intrinsics.sigma"))
+        let at = format!("{at}.sigma");
+        [sigma.fx, sigma.fy, sigma.cx, sigma.cy].into_iter().try_for_each(|s| not_negative(s, &at))
     }
 }

@@ -343,7 +343,7 @@ pub enum ViewRecordStatus {
 }
 
 /// How well the result predicts captures that never entered the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VerificationSummary {
     /// How many there are.
     pub captures: usize,
@@ -356,6 +356,9 @@ pub struct VerificationSummary {
     /// Whether these errors are no larger than the result states; `None` where it states none.
     #[serde(default)]
     pub as_stated: Option<bool>,
+    /// The same from tip poses that are corrected for the errors of the arm; `None` where these are not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corrected: Option<Box<Self>>,
 }
 
 /// A depth camera against the calibrated lens: depths of the target in the captures of the fit.

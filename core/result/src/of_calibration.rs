@@ -104,7 +104,7 @@ fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {
             by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
             lens_factor: Some(joint.widening.lens.sqrt()).filter(|factor| *factor > 1.0),
         }),
-        board: joint.shape.map(board),
+        board: joint.shape.map(BoardEstimate::from),
         target_size: joint.size.as_ref().map(|size| TargetSizeEstimate {
             true_over_stated: size.scale,
             sigma: size.sigma,
@@ -131,7 +131,7 @@ fn depths_estimate(depths: &DepthsInFit) -> DepthsEstimate {
 
 /// The details of an estimate from poses of the target whose unit was unknown.
 fn of_scaled_poses(shape: ShapeEstimate) -> EstimateDetails {
-    EstimateDetails { board: Some(board(shape)), ..EstimateDetails::default() }
+    EstimateDetails { board: Some(shape.into()), ..EstimateDetails::default() }
 }
 
 /// The details of a camera without a robot: the corners' noise is the only one, and the target's size is not seen.
@@ -144,7 +144,7 @@ fn of_camera(fit: &CameraFit) -> EstimateDetails {
             by: if widened { Evidence::Jackknife.name() } else { "none" }.to_owned(),
             lens_factor: None,
         }),
-        board: fit.shape.map(board),
+        board: fit.shape.map(BoardEstimate::from),
         ..EstimateDetails::default()
     }
 }
@@ -183,12 +183,14 @@ fn residual_distortion(shown: &ShownDistortion) -> ResidualDistortionEstimate {
     }
 }
 
-fn board(estimate: ShapeEstimate) -> BoardEstimate {
-    BoardEstimate {
-        warp_mm: estimate.shape.warp_m.map(|m| m * 1e3),
-        warp_sigma_mm: estimate.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
-        scale: estimate.shape.scale,
-        scale_sigma: estimate.scale_sigma,
+impl From<ShapeEstimate> for BoardEstimate {
+    fn from(estimate: ShapeEstimate) -> Self {
+        Self {
+            warp_mm: estimate.shape.warp_m.map(|m| m * 1e3),
+            warp_sigma_mm: estimate.warp_sigma_m.map(|sigma| sigma.map(|m| m * 1e3)),
+            scale: estimate.shape.scale,
+            scale_sigma: estimate.scale_sigma,
+        }
     }
 }
 

@@ -15,6 +15,7 @@ use handeye_estimate::{ArmFit, BesideArm};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::bent::BoardShape;
+use handeye_geometry::view_equations::DepthBias;
 
 /// Calibration that the exports of other programs are compared with: tip to camera, 1280×720, `plumb_bob`.
 pub const GOLDEN_TRANSLATION_M: [f64; 3] = [0.045, -0.032, 0.061];
@@ -125,6 +126,7 @@ pub fn golden() -> CalibrationResult {
         centre_rms_mm: 0.125,
         orientation_rms_deg: 0.01,
         as_stated: Some(true),
+        corrected: None,
     });
     result.truth = Some(TruthComparison { translation_error_mm: Some(0.2), ..TruthComparison::default() });
     "0.1.0".clone_into(&mut result.provenance.tool_version);
@@ -168,6 +170,7 @@ pub fn golden_arm() -> (Arm, ArmFit) {
             intrinsics: Intrinsics::pinhole(640, 480, 600.0),
             shape: BoardShape::default(),
             field: None,
+            depth: DepthBias::default(),
             free: Free { arm: true, ..Free::default() },
         },
         covariance: DMatrix::from_diagonal_element(12 + count, 12 + count, 1e-9),

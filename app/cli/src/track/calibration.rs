@@ -1,19 +1,31 @@
 //! The calibration that is tracked with.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_estimate::handeye::joint::SmallSample;
 use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_estimate::verify::Predictor;
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::targets::{Grid, TargetSpec};
-use handeye_result::{CalibrationResult, PrintEstimate, TARGET_OPTION};
+use handeye_result::{ArmEstimate, BoardEstimate, CalibrationResult, PrintEstimate, TARGET_OPTION, TransformEstimate};
 use handeye_session::{RESULT, Session};
 
 use crate::Failure;
 
-/// Reads a result, or that of a session; with the board it was made with, where that is known.
-pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
+/// What a result says.
+pub struct Read {
+    /// What goes with the tip poses that the robot reports.
+    pub calibrated: Predictor,
+    /// What goes with tip poses corrected for the errors of the arm, where correcting is expected to bring the tip nearer.
+    pub corrected: Option<(Predictor, Arc<CorrectedArm>)>,
+    /// The board it was made with, where that is known.
+    pub target: Option<TargetSpec>,
+}
+
+/// Reads a result, or that of a session.
+pub fn read(path: &Path) -> Result<Read, Failure> {
     let is_session = Session::is_session(path);
     let file = if is_session { path.join(RESULT) } else { path.to_path_buf() };
     let result = CalibrationResult::read(&file).map_err(Failure::unusable)?;
@@ -37,22 +49,43 @@ pub fn read(path: &Path) -> Result<(Predictor, Option<TargetSpec>), Failure> {
         reported.and_then(|value| serde_json::from_value(value).ok())
     };
     let board = result.estimate.as_ref().and_then(|estimate| estimate.board.as_ref());
+    let shape = |board: Option<&BoardEstimate>| {
+        board.map_or_else(BoardShape::default, |board| BoardShape {
+            warp_m: board.warp_mm.map(|mm| mm * 1e-3),
+            scale: board.scale,
+        })
+    };
     let print = result.estimate.as_ref().and_then(|estimate| estimate.print.as_ref());
-    let shape = board.map_or_else(BoardShape::default, |board| BoardShape {
-        warp_m: board.warp_mm.map(|mm| mm * 1e-3),
-        scale: board.scale,
-    });
     let calibrated = Predictor {
         hand_eye,
         intrinsics,
-        shape,
+        shape: shape(board),
         print_errors_m: print.map_or_else(Vec::new, PrintEstimate::errors_m),
         field: result.estimate.as_ref().and_then(|estimate| Some(estimate.robot_field.as_ref()?.field())),
+        arm: None,
         hand_eye_covariance: covariance,
         small_sample: small_sample(&result),
         uncertainty: None,
     };
-    Ok((calibrated, target))
+    let quality = &result.quality;
+    let reach = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm);
+    let helps = |arm: &&ArmEstimate| !arm.contradicted && reach.is_some_and(|(plain, corrected)| corrected < plain);
+    let corrected = result.arm.as_ref().filter(helps).and_then(|arm| {
+        let (hand_eye, covariance) = links_of(result.mode?, &arm.hand_eye, &arm.target)?;
+        let corrected = arm.corrected_arm().ok()?;
+        let by_arm = Predictor {
+            hand_eye,
+            intrinsics: arm.intrinsics.as_ref()?.intrinsics()?,
+            shape: shape(arm.board.as_ref().or(board)),
+            field: None,
+            arm: Some(corrected.errors.clone()),
+            hand_eye_covariance: covariance,
+            small_sample: corrected.small_sample,
+            ..calibrated.clone()
+        };
+        Some((by_arm, Arc::new(corrected)))
+    });
+    Ok(Read { calibrated, corrected, target })
 }
 
 /// How the error of the hand-eye transform is distributed; one without degrees of freedom is Gaussian.
@@ -68,8 +101,15 @@ fn small_sample(result: &CalibrationResult) -> SmallSample {
 }
 
 fn links(result: &CalibrationResult) -> Option<(HandEye, Option<nalgebra::Matrix6<f64>>)> {
-    let (hand_eye, target) = (result.hand_eye.as_ref()?, result.target.as_ref()?);
-    let links = match result.mode? {
+    links_of(result.mode?, result.hand_eye.as_ref()?, result.target.as_ref()?)
+}
+
+fn links_of(
+    mode: Mode,
+    hand_eye: &TransformEstimate,
+    target: &TransformEstimate,
+) -> Option<(HandEye, Option<nalgebra::Matrix6<f64>>)> {
+    let links = match mode {
         Mode::EyeInHand => HandEye::EyeInHand { tip_from_camera: hand_eye.pose()?, base_from_target: target.pose()? },
         Mode::EyeToHand => HandEye::EyeToHand { base_from_camera: hand_eye.pose()?, tip_from_target: target.pose()? },
     };

@@ -11,7 +11,7 @@ use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median_high;
 use handeye_images::gray_from_rgb;
 use handeye_link::{ControlPort, MotionOutcome, Newest, PortError, Simulation, end_of_following};
-use handeye_track::{Estimate, Image, Keep, Setup, State};
+use handeye_track::{Estimate, Image, Keep, State};
 use serde_json::{Value, json};
 
 use crate::late::Late;
@@ -20,10 +20,11 @@ use crate::towards_board::TowardsBoard;
 use crate::{Failure, out, record};
 use handeye_record::Recorder;
 use handeye_workbench::model::{FollowRequest, FollowStatus, Step, Tracked};
+use handeye_workbench::motion::correction::stands_here;
 use handeye_workbench::recording::{Entry, Recording as _};
 use handeye_workbench::session::start::REFERENCE_POSES;
 use handeye_workbench::text::Language;
-use handeye_workbench::worker::{FollowLine, TrackedImage, Tracking};
+use handeye_workbench::worker::{FollowLine, TrackedBy, TrackedImage, Tracking};
 
 /// Rest between two looks at the clock of the cell.
 const LOOK: Duration = Duration::from_millis(2);
@@ -61,7 +62,9 @@ pub struct Job<'a> {
     /// Where it is recorded.
     pub recorder: &'a Recorder,
     /// What is tracked, and with what.
-    pub setup: Setup,
+    pub by: TrackedBy,
+    /// The same by corrected tip poses, for the arm of the calibration.
+    pub corrected: Option<TrackedBy>,
     /// What the arm does.
     pub task: Task,
     /// How many images.
@@ -83,6 +86,8 @@ pub struct Taken<'a> {
 /// What came out of it.
 #[derive(Debug, Default)]
 pub struct Summary {
+    /// Whether tip poses are corrected for the errors of the arm.
+    is_corrected: bool,
     frames: u64,
     tracked: u64,
     took_s: f64,
@@ -114,6 +119,23 @@ impl Squares {
     }
 }
 
+impl Job<'_> {
+    /// By corrected tip poses where the arm of the calibration is the one that stands here.
+    fn by_on(&self, cell: &mut OpenCell) -> Result<TrackedBy, Failure> {
+        let Some(corrected) = &self.corrected else { return Ok(self.by.clone()) };
+        let now = cell.robot_state()?;
+        if corrected.arm.as_ref().is_some_and(|arm| stands_here(arm, &now)) {
+            tracing::info!("tip poses are corrected for the errors of the arm, and so is what it is sent");
+            return Ok(corrected.clone());
+        }
+        tracing::warn!(
+            "tip poses are taken as they are reported: by its joints the tip is not where the arm of the calibration has it, so this is \
+             another arm, or another tool"
+        );
+        Ok(self.by.clone())
+    }
+}
+
 /// Tracks until there are images enough or it is cancelled. The arm is at rest when it returns. Following that ends for another
 /// reason is an error.
 pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut Taken<'_>) -> Result<(), Failure> {
@@ -126,7 +148,9 @@ pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut
     }
     let line = Arc::new(FollowLine::default());
     // It lives until the arm stands: an arm that follows looks at what is tracked.
-    let mut tracking = Tracking::new(job.setup.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
+    let by = job.by_on(cell)?;
+    taken.summary.is_corrected = by.arm.is_some();
+    let mut tracking = Tracking::new(by.clone(), Arc::clone(&line)).map_err(Failure::unusable)?;
     let mut watch = Watch { tracking: &mut tracking, job, line: &line, cancel, taken };
     match job.task {
         Task::Watch => watch.run(cell, &|| false).map(drop),
@@ -139,7 +163,7 @@ pub fn run(cell: &mut OpenCell, job: &Job<'_>, cancel: &CancelToken, taken: &mut
                     Ok(newest.is_some())
                 })?;
             }
-            reach(cell, job, newest, index, stand_off_m, cancel)
+            reach(cell, job, &by, newest, (index, stand_off_m), cancel)
         }
         Task::Follow(request) => follow_board(cell, job, &mut watch, request),
     }
@@ -269,6 +293,7 @@ impl Watch<'_, '_> {
                 continue;
             };
             has_pose = true;
+            let base_from_tip = tracking.by().base_from_tip(base_from_tip, &raw.joints_rad).ok_or_else(no_joints)?;
             let sight = TrackedImage {
                 number: summary.frames + 1,
                 received_s,
@@ -415,27 +440,37 @@ impl Follower {
 fn reach(
     cell: &mut OpenCell,
     job: &Job<'_>,
+    by: &TrackedBy,
     newest: Option<Estimate>,
-    index: usize,
-    stand_off_m: f64,
+    (index, stand_off_m): (usize, f64),
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
     let estimate = newest.ok_or_else(|| {
         Failure::failed(anyhow::anyhow!("the board is not seen: move the arm or the board until the camera sees it"))
     })?;
-    let base_from_tip_orientation = cell.robot_state()?.base_from_tip.rotation();
+    let now = cell.robot_state()?;
+    let here = by.base_from_tip(now.base_from_tip, &now.joints_rad);
+    let base_from_tip_orientation = here.ok_or_else(no_joints)?.rotation();
     let keep = Keep::Corner { index, stand_off_m, base_from_tip_orientation };
-    let goal = keep.tip_goal(&estimate, &job.setup.calibrated, &job.setup.target).ok_or_else(|| {
+    let goal = keep.tip_goal(&estimate, &by.setup.calibrated, &by.setup.target).ok_or_else(|| {
         Failure::unusable(anyhow::anyhow!(
             "only a camera on the tip can lead it to the board; this one stands beside the robot"
         ))
     })?;
-    let goal = Goal::Tip(goal.base_from_tip);
+    let command = by.arm.as_ref().map(|arm| arm.command(&goal.base_from_tip, &now.joints_rad)).transpose();
+    let command = command.map_err(Failure::failed)?;
+    let goal = Goal::Tip(command.map_or(goal.base_from_tip, |command| command.base_from_tip));
     if job.dry_run {
         out::line(format_args!("to corner {index}: {}", cell.described(&goal)))?;
         return out::line("nothing was moved");
     }
     moved(&cell.move_to(&format!("corner {index}"), &goal, cancel)).map(drop)
+}
+
+fn no_joints() -> Failure {
+    Failure::failed(anyhow::anyhow!(
+        "the joints are not those of the arm whose errors are corrected: give --as-reported, or calibrate with this robot"
+    ))
 }
 
 fn progress(tracked: &Tracked) -> String {
@@ -490,6 +525,7 @@ impl Summary {
         json!({
             "frames": self.frames,
             "tracked": self.tracked,
+            "tip_poses": if self.is_corrected { "corrected" } else { "reported" },
             "rate_hz": self.rate_hz(),
             "latency_median_ms": self.latency_s().map(|s| s * 1e3),
             "position_rms_mm": self.position.rms().map(|m| m * 1e3),

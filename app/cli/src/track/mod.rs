@@ -19,6 +19,7 @@ use crate::{Failure, RerunArg, out, solve};
 use handeye_record::{Pace, RerunChoice};
 use handeye_workbench::arguments::heading;
 use handeye_workbench::model::{FollowRequest, Tracked};
+use handeye_workbench::worker::TrackedBy;
 use live::{Job, Summary, Taken, Task};
 
 /// At the end of its help.
@@ -53,6 +54,10 @@ pub struct TrackArgs {
     /// With --corner and --reach: how far the tip stays off the board, millimetres.
     #[arg(long, value_name = "MM", default_value_t = 100.0, help_heading = heading::FOLLOWING)]
     stand_off: f64,
+    /// With --follow and --reach: take tip poses as the robot reports them, although the calibration knows the errors of its arm.
+    /// Without it they are corrected, and so is what the arm is sent, where that brings the tip nearer.
+    #[arg(long, help_heading = heading::FOLLOWING)]
+    as_reported: bool,
     /// End after so many images; without it, at Ctrl-C.
     #[arg(long, value_name = "N", help_heading = heading::TRACKING)]
     frames: Option<u64>,
@@ -76,7 +81,7 @@ pub struct TrackArgs {
 pub fn run(args: &TrackArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let mut scene = args.cell.scene()?;
-    let (calibrated, said_target) = calibration::read(&args.calibration)?;
+    let calibration::Read { calibrated, corrected, target: said_target } = calibration::read(&args.calibration)?;
     let target = match &args.target {
         Some(text) => calibration::chessboard(text)?,
         None => said_target.ok_or_else(|| {
@@ -117,9 +122,13 @@ pub fn run(args: &TrackArgs) -> Result<(), Failure> {
         )));
     }
     let recorder = rerun_arg::start(&args.rerun, RerunChoice::Off, Pace::Live, false)?;
+    // Who only watches gets what goes with commands as they are.
+    let corrects = !matches!(task, Task::Watch) && !args.as_reported;
+    let by = |calibrated, arm| TrackedBy { setup: Setup { target, calibrated, motion: MotionModel::default() }, arm };
     let job = Job {
         recorder: &recorder,
-        setup: Setup { target, calibrated, motion: MotionModel::default() },
+        by: by(calibrated, None),
+        corrected: corrected.filter(|_| corrects).map(|(calibrated, arm)| by(calibrated, Some(arm))),
         task,
         frames: args.frames,
         // The board of somebody else's cell is not ours to move, nor is the arm before it follows.

@@ -1,5 +1,6 @@
 //! The newest sight of the board, and the capture that is under way.
 
+use handeye_arm::JointValues;
 use handeye_capture::Wait;
 use handeye_detect::VisionError;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -19,6 +20,8 @@ pub struct LiveDetection {
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Where the tip was, where that is known.
     pub base_from_tip: Option<Pose<Base, Tip>>,
+    /// The joints at the same instant \[rad\]; none where the robot does not report them.
+    pub joints_rad: JointValues,
     /// How long the search took \[s\].
     pub took_s: f64,
     /// Why the image could not be searched at all, which is another thing than a board that is not in it.

@@ -18,7 +18,7 @@ use crate::motion::update::motion_lost;
 use crate::session::update::{prepare_session, send_intrinsics, send_target};
 use crate::taught::sequence::stop_sequence;
 use crate::text::Text;
-use crate::track::update::send_tracking;
+use crate::track::update::{reconsider_correction, send_tracking};
 use crate::worker::{CameraTask, ControlTask, Request, SessionThreads, Workers};
 use handeye_wording::text;
 
@@ -43,7 +43,10 @@ pub(crate) fn apply(cx: &mut Context, connector: &Connector, command: Command) {
 pub(crate) fn absorb(cx: &mut Context, event: Event) {
     match event {
         Event::Link { link, state } => link_changed(cx, link, state),
-        Event::Robot(robot) => robot_read(&mut cx.model, robot),
+        Event::Robot(robot) => {
+            robot_read(&mut cx.model, robot);
+            reconsider_correction(&mut cx.model, &cx.workers);
+        }
         Event::NoRobot => cx.model.robot = None,
         Event::Cell(facts) => cell_found(&mut cx.model, &cx.workers, &cx.desk, *facts),
         Event::Heard { severity, words } => heard(&mut cx.model, severity, words),

@@ -196,6 +196,15 @@ impl Default for SceneView {
 pub struct PickedPoint {
     /// The pixel.
     pub pixel: ImagePoint,
+    /// By the tip pose as it is reported: for commands as they are.
+    pub as_reported: MeasuredTwice,
+    /// By the tip pose corrected for the errors of the arm: for corrected commands. `None` where these are not known.
+    pub corrected: Option<MeasuredTwice>,
+}
+
+/// Where a point is in the base, in two ways.
+#[derive(Debug, Clone)]
+pub struct MeasuredTwice {
     /// From the depth at the pixel; or why not.
     pub from_depth: Result<MeasuredPoint, Text>,
     /// Where the ray through the pixel meets the board as PnP sees it; or why not.

@@ -27,8 +27,8 @@ pub use crate::capture::state::{
 pub use crate::export::state::{ExportState, Preview, PreviewFile, Written};
 pub use crate::import::state::{Converted, Found, ImportState, ImportWork};
 pub use crate::live::state::{
-    ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, Overlays, PickedPoint, SceneView, Viewport,
-    exports_of,
+    ColouredDepth, FrameImages, FrameInfo, ImagePoint, LiveFrame, MeasuredTwice, Overlays, PickedPoint, SceneView,
+    Viewport, exports_of,
 };
 pub use crate::messages::state::{Home, Message, Messages, Severity};
 pub use crate::motion::state::{JogSettings, JogStep, Motion, MotionId, MotionRequest, PendingMove};
@@ -38,7 +38,7 @@ pub use crate::session::state::{
 };
 pub use crate::shell::state::{Dialog, Pane, Step};
 pub use crate::solve::estimated::{EstimatedValue, estimated};
-pub use crate::solve::state::{JobId, SolveState, SolveStatus, Solved};
+pub use crate::solve::state::{Corrected, JobId, SolveState, SolveStatus, Solved};
 pub use crate::solve::tip_box::{BoxState, WorkBox, in_camera as box_in_camera, judge_box};
 pub use crate::track::state::{
     BoardMotion, FollowRequest, FollowStatus, MAX_TRACK_POINTS, TrackError, TrackPoint, TrackState, Tracked,

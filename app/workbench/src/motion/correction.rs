@@ -5,32 +5,50 @@ use std::sync::Arc;
 use handeye_estimate::corrected_arm::CorrectedArm;
 use handeye_geometry::frames::{Base, Pose, Tip};
 
-use crate::model::{Model, MotionGoal, Solved};
+use crate::model::{Corrected, Model, MotionGoal, RobotState, Solved};
 use crate::text::Text;
 
 /// How far the chain of the answer may be from where the robot reports its tip, metres and radians: farther off it is another arm, or
 /// another tool.
 const FITS: (f64, f64) = (1e-3, 2e-3);
 
-/// The arm of the answer with its errors, where it is the one that stands here and its errors may be counted on.
-pub fn corrected_arm(model: &Model) -> Option<(&Solved, &Arc<CorrectedArm>)> {
+/// What goes with commands that are corrected for the errors of the arm, where it is the one that stands here and its errors may be
+/// counted on.
+pub fn corrected(model: &Model) -> Option<(&Solved, &Corrected)> {
     let solved = model.solve.current()?;
-    let arm = solved.corrected_arm.as_ref()?;
-    let robot = model.robot.as_ref()?;
-    let (off_m, off_rad) = arm.arm.forward(&robot.joints_rad).ok()?.distance_to(&robot.base_from_tip);
-    (off_m <= FITS.0 && off_rad <= FITS.1).then_some((solved, arm))
+    let corrected = solved.corrected.as_ref()?;
+    stands_here(&corrected.arm, model.robot.as_ref()?).then_some((solved, corrected))
+}
+
+/// Whether this is the arm that reports that.
+pub fn stands_here(arm: &CorrectedArm, robot: &RobotState) -> bool {
+    let place = arm.arm.forward(&robot.joints_rad).map(|tip| tip.distance_to(&robot.base_from_tip));
+    place.is_ok_and(|(off_m, off_rad)| off_m <= FITS.0 && off_rad <= FITS.1)
+}
+
+/// What a tool arrives within by the controller as it is and by corrected commands, millimetres, 95 %; `None` where the errors of this arm
+/// are not known.
+pub fn expected_mm(model: &Model) -> Option<(f64, f64)> {
+    let quality = &corrected(model)?.0.result.quality;
+    quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm)
+}
+
+/// What goes with corrected commands, where these are expected to bring the tip nearer.
+pub fn helpful(model: &Model) -> Option<&Corrected> {
+    let (plain, by_corrected) = expected_mm(model)?;
+    corrected(model).filter(|_| by_corrected < plain).map(|(_, corrected)| corrected)
 }
 
 /// Where the tip really is.
 pub fn real_tip(model: &Model) -> Option<Pose<Base, Tip>> {
-    let (_, arm) = corrected_arm(model)?;
-    arm.actual(&model.robot.as_ref()?.joints_rad).ok()
+    let (_, corrected) = corrected(model)?;
+    corrected.arm.actual(&model.robot.as_ref()?.joints_rad).ok()
 }
 
 /// The distance from [`real_tip`] that the tip is within with a probability of 95 %, metres.
 pub fn real_tip_error_95_m(model: &Model) -> Option<f64> {
-    let (_, arm) = corrected_arm(model)?;
-    arm.error_95_m(&model.robot.as_ref()?.joints_rad).ok()
+    let (_, corrected) = corrected(model)?;
+    corrected.arm.error_95_m(&model.robot.as_ref()?.joints_rad).ok()
 }
 
 /// By which arm a move is corrected, and where it begins.

@@ -10,7 +10,7 @@ use super::command::{Command, Event};
 use crate::app::{Context, Numbers};
 use crate::model::{Jog, JogStep, Model, Motion, MotionGoal, MotionId, MotionOutcome, MotionRequest, Pane, Severity};
 use crate::motion::ask::{confirm_move, go_home, may_set_out, set_confirm_moves, set_out, skip_move};
-use crate::motion::correction::{Correction, corrected_arm};
+use crate::motion::correction::{Correction, corrected};
 use crate::motion::rest::{stop, stopped};
 use crate::taught::sequence::{plan_refused, sequence_moved};
 use crate::text::Text;
@@ -52,7 +52,7 @@ pub(crate) fn start_motion(cx: &mut Context, goal: MotionGoal, what: Text) {
 
 /// The same by the errors of the arm. Where they are not known any more nothing moves: the person asked for another place.
 fn start_corrected(cx: &mut Context, goal: MotionGoal, what: Text) {
-    let arm = corrected_arm(&cx.model).map(|(_, arm)| Arc::clone(arm));
+    let arm = corrected(&cx.model).map(|(_, corrected)| Arc::clone(&corrected.arm));
     let Some((arm, robot)) = arm.zip(cx.model.robot.as_ref()) else {
         let why = text!("The errors of this arm are not known: nothing was moved");
         return cx.model.notify_in(Pane::Jog, Severity::Warning, why);

@@ -6,6 +6,7 @@ mod page;
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::resolution::{angle_text, place_text};
+use handeye_estimate::verify::Verification;
 use handeye_result::{
     ArmLevels, CalibrationResult, EstimateDetails, HeldOutByArm, JointErrorEstimate, MethodStatus, TransformEstimate,
     ViewRecordStatus,
@@ -105,9 +106,13 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
     })
 }
 
-/// How near a tool arrives, where the arm is known.
+/// How near a tool arrives, and why that is not known.
 fn reach(result: &CalibrationResult) -> Option<String> {
-    let plain = result.quality.reach_error_95_mm?;
+    let Some(plain) = result.quality.reach_error_95_mm else {
+        let is_asked = result.mode.is_some() && result.quality.tip_error_95_mm.is_some() && result.arm.is_none();
+        let why = "without the errors of the arm, which take its kinematics and the joint values of every capture";
+        return is_asked.then(|| format!("how near a tool arrives is not known {why}"));
+    };
     let length = result.arm.as_ref().map(|arm| format!(" of {:.0} mm", Vector3::from(arm.tool_m).norm() * 1e3));
     let stated = format!(
         "a tool{} arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is",
@@ -355,14 +360,23 @@ fn depth_camera(result: &CalibrationResult) -> Option<Section> {
 }
 
 /// How the answer does on captures that never entered the fit; nothing when there are none.
-fn verification(solved: &Solved) -> Option<Section> {
-    let verification = match solved.verification.as_ref()? {
-        Ok(verification) => verification,
-        Err(error) => {
-            let summary = vec![error.to_string()];
-            return Some(Section { title: "verification".to_owned(), summary, ..Section::default() });
+fn verification(solved: &Solved) -> Vec<Section> {
+    let title = "verification";
+    match &solved.verification {
+        None => Vec::new(),
+        Some(Err(error)) => {
+            vec![Section { title: title.to_owned(), summary: vec![error.to_string()], ..Section::default() }]
         }
-    };
+        Some(Ok(verification)) => {
+            let corrected = solved.corrected.as_ref().and_then(|corrected| corrected.verification.as_ref());
+            let by_arm =
+                corrected.map(|it| checked("verification by tip poses corrected for the errors of the arm,", it));
+            std::iter::once(checked(title, verification)).chain(by_arm).collect()
+        }
+    }
+}
+
+fn checked(title: &str, verification: &Verification) -> Section {
     let captures = match verification.captures.len() {
         1 => "1 capture that was".to_owned(),
         count => format!("{count} captures that were"),
@@ -375,8 +389,8 @@ fn verification(solved: &Solved) -> Option<Section> {
     let verdict = verification
         .is_as_stated()
         .map(|is_as_stated| if is_as_stated { "no larger than stated" } else { "LARGER THAN STATED" });
-    Some(Section {
-        title: format!("verification on {captures} not in the fit"),
+    Section {
+        title: format!("{title} on {captures} not in the fit"),
         summary: [
             Some(format!("{:.4} px RMS", verification.rms_px)),
             Some(format!("middle of the board {mm:.3} mm and {deg:.4}° RMS")),
@@ -387,7 +401,7 @@ fn verification(solved: &Solved) -> Option<Section> {
         .collect(),
         lines: lines.collect(),
         name_width: 24,
-    })
+    }
 }
 
 #[cfg(test)]

@@ -28,8 +28,8 @@ pub struct Solved {
     pub calibration: Calibration,
     /// The document that is exported and compared.
     pub result: CalibrationResult,
-    /// The arm with its errors; `None` where they are not known or not to be counted on.
-    pub corrected_arm: Option<Arc<CorrectedArm>>,
+    /// What goes with commands that are corrected for the errors of the arm; `None` where these are not known or not to be counted on.
+    pub corrected: Option<Arc<Corrected>>,
     /// What is weak and what to do next.
     pub findings: Vec<Finding>,
     /// The calibration as what predicts and measures; `None` without a hand-eye.
@@ -42,6 +42,17 @@ pub struct Solved {
     pub verified_captures: Vec<CaptureId>,
     /// How long it took \[s\].
     pub took_s: f64,
+}
+
+/// What goes with commands that are corrected for the errors of the arm.
+#[derive(Debug, Clone)]
+pub struct Corrected {
+    /// The arm with its errors.
+    pub arm: Arc<CorrectedArm>,
+    /// The calibration as what predicts and measures by corrected tip poses.
+    pub calibrated: Predictor,
+    /// As [`Solved::verification`]; `None` also where the joints of a capture are not known.
+    pub verification: Option<Verification>,
 }
 
 impl Solved {

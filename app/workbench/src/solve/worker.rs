@@ -8,7 +8,7 @@ use handeye_estimate::diagnose::examine;
 use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::placement::ArmOfViews;
-use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification, VerifyError};
+use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification};
 use handeye_estimate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
 use handeye_geometry::progress::{CancelToken, Progress, Work};
 use handeye_geometry::targets::bent::BoardShape;
@@ -16,7 +16,7 @@ use handeye_geometry::targets::observation::View;
 use handeye_result::{ArmEstimate, CalibrationResult, DepthSummary, VerificationSummary, solve_options};
 use handeye_session::CaptureId;
 
-use crate::model::{JobId, Solved, Truth};
+use crate::model::{Corrected, JobId, Solved, Truth};
 use crate::solve;
 use crate::solve::SolveOutcome;
 use crate::truth;
@@ -113,18 +113,26 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
     result.depth = depth.as_ref().map(DepthSummary::from);
     result.findings = findings.iter().map(Finding::to_record).collect();
     let calibrated = Predictor::new(&calibration).ok();
-    let verification = calibrated.as_ref().filter(|_| !job.verification.is_empty()).map(|calibrated| {
-        let captures: Vec<&View> = job.verification.iter().map(|(_, view)| view).collect();
-        verify::verify(calibrated, &job.observations.target, &captures, work)
+    let captures: Vec<&View> = job.verification.iter().map(|(_, view)| view).collect();
+    let verified = |calibrated: &Predictor| {
+        (!captures.is_empty()).then(|| verify::verify(calibrated, &job.observations.target, &captures, work))
+    };
+    let verification = calibrated.as_ref().and_then(verified);
+    let counts = |arm: &&ArmEstimate| !arm.contradicted && result.quality.reach_error_corrected_95_mm.is_some();
+    let corrected_arm = result.arm.as_ref().filter(counts).and_then(|arm| arm.corrected_arm().ok());
+    let corrected = corrected_arm.zip(Predictor::of_arm(&calibration)).map(|(arm, calibrated)| {
+        let verification = verified(&calibrated).and_then(Result::ok);
+        Arc::new(Corrected { arm: Arc::new(arm), calibrated, verification })
     });
-    if let Some(Err(VerifyError::Cancelled)) = verification {
+    if work.is_cancelled() {
         return Err(CalibrateError::HandEye(HandEyeError::Cancelled));
     }
-    result.verification = verification.as_ref().and_then(|outcome| outcome.as_ref().ok()).map(summary);
-    let counts = |arm: &&ArmEstimate| !arm.contradicted && result.quality.reach_error_corrected_95_mm.is_some();
-    let corrected_arm = result.arm.as_ref().filter(counts).and_then(|arm| arm.corrected_arm().ok()).map(Arc::new);
+    result.verification = verification.as_ref().and_then(|outcome| outcome.as_ref().ok()).map(|as_it_is| {
+        let corrected = corrected.as_ref().and_then(|corrected| corrected.verification.as_ref());
+        VerificationSummary { corrected: corrected.map(summary).map(Box::new), ..summary(as_it_is) }
+    });
     Ok(Solved {
-        corrected_arm,
+        corrected,
         job: job.id,
         captures: job.captures.clone(),
         result,
@@ -164,6 +172,7 @@ fn summary(verification: &Verification) -> VerificationSummary {
         centre_rms_mm: verification.centre_rms_m * 1e3,
         orientation_rms_deg: verification.orientation_rms_rad.to_degrees(),
         as_stated: verification.is_as_stated(),
+        corrected: None,
     }
 }
 

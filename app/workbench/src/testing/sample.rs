@@ -12,7 +12,7 @@ use handeye_estimate::diagnose::findings::{self, Finding, FindingOptions};
 use handeye_estimate::handeye::joint::{ArmErrors, ArmParameter, LinkError, SmallSample, arm_parameters};
 use handeye_estimate::handeye::screening::Distance;
 use handeye_estimate::handeye::{HandEye, Mode};
-use handeye_estimate::verify::{self, Predictor};
+use handeye_estimate::verify::{self, Predictor, Uncertainty, Verification};
 use handeye_estimate::{self as estimate, CameraKnowledge, Method, Observations, ObservedView, ViewStatus};
 use handeye_export::ExportInput;
 use handeye_geometry::camera::Intrinsics;
@@ -21,16 +21,17 @@ use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::{Corner, Corners, View};
 use handeye_session::{CaptureId, CaptureRecord, Document, Role};
-use handeye_track::{BoardDetection, ByDepth, Estimate, State, Update};
+use handeye_track::{BoardDetection, ByDepth, Estimate, MotionModel, Setup, State, Update};
 use image::{Rgb, RgbImage};
 use nalgebra::{DMatrix, Isometry3, Matrix6, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::model::{
-    BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, FollowRequest, FollowStatus, FrameImages, FrameInfo,
-    JobId, LinkState, LiveDetection, LiveFrame, Model, Moves, Observed, PreviewFile, RobotState, SessionState,
-    Simulation, Solved, TrackError, TrackPoint, TrackState, Tracked, Truth, ViewSettings,
+    BoardMotion, BoardPath, CellFacts, CellSource, ColouredDepth, Corrected, FollowRequest, FollowStatus, FrameImages,
+    FrameInfo, JobId, LinkState, LiveDetection, LiveFrame, Model, Moves, Observed, PreviewFile, RobotState,
+    SessionState, Simulation, Solved, TrackError, TrackPoint, TrackState, Tracked, Truth, ViewSettings,
 };
 use crate::session::start::{self, BOARD};
+use crate::track::worker::TrackedBy;
 use crate::truth;
 
 /// Captures of the fit.
@@ -180,6 +181,7 @@ pub fn connected() -> Model {
         corners: Some(corners(1)),
         camera_from_target: Some(camera_from_target(1)),
         base_from_tip: Some(base_from_tip(1)),
+        joints_rad: [0.1, 0.5, -1.0, 0.0, 1.5, 0.0].into(),
         took_s: 0.006,
         problem: None,
         dropped: 0,
@@ -246,7 +248,7 @@ pub fn solved() -> Model {
         captures: (1..=FITTED).map(CaptureId).collect(),
         findings: findings::findings(&observations, Some(&calibration), &FINDINGS),
         result,
-        corrected_arm: None,
+        corrected: None,
         calibrated: Some(calibrated),
         verification: Some(verification),
         depth: None,
@@ -291,7 +293,20 @@ pub fn corrected_arm() -> CorrectedArm {
 /// [`solved`] with an answer that knows the errors of the arm.
 pub fn with_errors_of_the_arm() -> Model {
     with_answer(|solved| {
-        solved.corrected_arm = Some(Arc::new(corrected_arm()));
+        let (arm, reported) = (corrected_arm(), solved.calibrated.clone().expect("a hand-eye"));
+        let uncertainty = reported.uncertainty.as_ref().map(|uncertainty| {
+            let (known, of_arm) = (uncertainty.covariance.nrows(), arm.covariance.nrows());
+            let mut covariance = DMatrix::zeros(known + of_arm, known + of_arm);
+            covariance.view_mut((0, 0), (known, known)).copy_from(&uncertainty.covariance);
+            covariance.view_mut((known, known), (of_arm, of_arm)).copy_from(&arm.covariance);
+            Uncertainty { covariance, ..uncertainty.clone() }
+        });
+        let calibrated = Predictor { arm: Some(arm.errors.clone()), uncertainty, ..reported };
+        let verification = solved.verification.clone().and_then(Result::ok).map(|it| {
+            let centre_rms_m = it.centre_rms_m / 8.0;
+            Verification { centre_rms_m, ..it }
+        });
+        solved.corrected = Some(Arc::new(Corrected { arm: Arc::new(arm), calibrated, verification }));
         solved.result.quality.reach_error_95_mm = Some(2.91);
         solved.result.quality.reach_error_corrected_95_mm = Some(0.25);
     })
@@ -390,8 +405,15 @@ pub fn tracking() -> Model {
         angular_velocity_rad_s: Vector3::zeros(),
     };
     let error = Some(TrackError { position_m: 0.31e-3, rotation_rad: 0.9e-3 });
+    let setup = Setup {
+        target: model.document().meta.target,
+        calibrated: model.calibrated().expect("solved").clone(),
+        motion: MotionModel::default(),
+    };
     model.track = TrackState {
         on: true,
+        by: Some(Arc::new(TrackedBy { setup, arm: None })),
+        wants_corrected: None,
         request: Some(FollowRequest::KeepView),
         follow: FollowStatus::Following { distance_m: 1.2e-3, angle_rad: 4e-3, is_kept_off: false },
         newest: Some(Arc::new(Tracked {

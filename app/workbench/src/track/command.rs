@@ -16,6 +16,8 @@ pub enum Command {
     SetTracking(bool),
     /// Have the arm follow the board; `None` has it come to rest.
     SetFollow(Option<FollowRequest>),
+    /// Correct tip poses and what the arm is sent for the errors of the arm, or take them as they are reported.
+    SetCorrected(bool),
     /// Have the simulated cell move its board.
     MoveBoard(BoardMotion),
     /// Hide the board of the simulated cell, or show it again.

@@ -8,6 +8,7 @@ use handeye_estimate::handeye::HandEye;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_track::{Estimate, Keep, Rest, Setup, State, TipGoal, Update};
 
+use super::worker::TrackedBy;
 use crate::model::{FollowRequest, FollowStatus};
 use crate::text::Text;
 use handeye_wording::text;
@@ -28,7 +29,7 @@ pub struct FollowLine {
 
 #[derive(Default)]
 struct Inner {
-    setup: Option<Setup>,
+    by: Option<TrackedBy>,
     newest: Option<Update>,
     rest: Rest,
     aim: Option<Aim>,
@@ -62,9 +63,9 @@ impl FollowLine {
     }
 
     /// What is tracked from now on, or that nothing is.
-    pub fn set_up(&self, setup: Option<Setup>) {
+    pub fn set_up(&self, by: Option<TrackedBy>) {
         let mut inner = self.inner();
-        inner.setup = setup;
+        inner.by = by;
         (inner.newest, inner.rest) = (None, Rest::default());
     }
 
@@ -83,7 +84,7 @@ impl FollowLine {
     /// The board as it is tracked now, for a camera on the tip; `None` while it is not known where it is.
     pub fn board_in_view(&self) -> Option<BoardInView> {
         let inner = self.inner();
-        let setup = inner.setup.as_ref()?;
+        let setup = &inner.by.as_ref()?.setup;
         let HandEye::EyeInHand { tip_from_camera, .. } = setup.calibrated.hand_eye else { return None };
         Some(BoardInView {
             base_from_target: inner.newest.as_ref()?.estimate.as_ref()?.base_from_target,
@@ -163,7 +164,9 @@ impl Inner {
 
     fn goal(&mut self, moment: &FollowMoment) -> Result<TipGoal, NoGoal> {
         let ever = |why| NoGoal::Ever(why);
-        let setup = self.setup.as_ref().ok_or_else(|| ever(text!("The board is not tracked: start tracking first")))?;
+        let no_joints = || ever(text!("The joints are not those of the arm whose errors are corrected: solve again"));
+        let by = self.by.as_ref().ok_or_else(|| ever(text!("The board is not tracked: start tracking first")))?;
+        let setup = &by.setup;
         let newest = self.newest.as_ref().ok_or_else(|| ever(text!("The board has not been seen yet")))?;
         let (Some(estimate), State::Tracking { .. } | State::Coasting { .. }) = (&newest.estimate, newest.state) else {
             return Err(NoGoal::Now(text!("The board was lost: bring it into view and start again")));
@@ -181,12 +184,18 @@ impl Inner {
         let now = self.rest.at().unwrap_or(estimate).carried_to(moment.sim_time_s);
         let keep = match self.aim.take() {
             Some(Aim::Fixed(keep)) => keep,
-            Some(Aim::Wished(request)) => fixed(request, &now, setup, &moment.base_from_tip),
+            Some(Aim::Wished(request)) => {
+                let here = by.base_from_tip(moment.base_from_tip, &moment.joints).ok_or_else(no_joints)?;
+                fixed(request, &now, setup, &here)
+            }
             None => return Err(ever(text!("The arm was not asked to follow"))),
         };
         let goal = keep.tip_goal(&now, &setup.calibrated, &setup.target);
         self.aim = Some(Aim::Fixed(keep));
-        goal.ok_or_else(|| ever(text!("Only a camera on the tip can follow: this one stands beside the robot")))
+        let goal =
+            goal.ok_or_else(|| ever(text!("Only a camera on the tip can follow: this one stands beside the robot")))?;
+        let base_from_tip = by.command(goal.base_from_tip, &moment.joints).ok_or_else(no_joints)?;
+        Ok(TipGoal { base_from_tip, ..goal })
     }
 }
 

@@ -2,9 +2,14 @@ use handeye_geometry::frames::{Base, Pose, Tip};
 
 use super::*;
 use crate::testing::sample;
+use handeye_estimate::corrected_arm::CorrectedArm;
 
 /// What tracks the board of the sample, and its newest sight of it at 30 s.
 fn line() -> (FollowLine, Update, Pose<Base, Tip>) {
+    line_by(None)
+}
+
+fn line_by(arm: Option<std::sync::Arc<CorrectedArm>>) -> (FollowLine, Update, Pose<Base, Tip>) {
     let model = sample::tracking();
     let setup = Setup {
         target: model.document().meta.target,
@@ -12,7 +17,7 @@ fn line() -> (FollowLine, Update, Pose<Base, Tip>) {
         motion: handeye_track::MotionModel::default(),
     };
     let line = FollowLine::default();
-    line.set_up(Some(setup));
+    line.set_up(Some(TrackedBy { setup, arm }));
     let newest = model.track.newest.as_ref().expect("tracked").update.clone();
     (line, newest, model.robot.as_ref().expect("a robot").base_from_tip)
 }
@@ -32,6 +37,30 @@ fn an_arm_that_was_moved_waits_for_the_board_and_then_keeps_the_view_that_it_has
     let ArmRequest::Towards(goal) = line.request(&moment(30.05, tip)) else { panic!("it follows") };
     // The board is at 6 mm/s: after two passes the goal is still where the tip is.
     assert!(goal.base_from_tip.distance_to(&tip).0 < 1e-3);
+}
+
+/// An arm that goes where it is sent comes to rest with its tip, as it really is, over the corner.
+#[test]
+fn an_arm_that_is_off_is_sent_where_its_tip_really_gets_to_the_goal() {
+    let arm = sample::corrected_arm();
+    let (line, seen, _) = line_by(Some(std::sync::Arc::new(arm.clone())));
+    let mut joints = [0.1, 0.5, -1.0, 0.0, 1.5, 0.0];
+    let over_corner = FollowRequest::Corner { index: 0, stand_off_m: 0.05 };
+    line.see(&seen);
+    line.begin(over_corner);
+    let estimate = seen.estimate.as_ref().expect("seen").carried_to(30.0);
+    let board = estimate.base_from_target;
+    let corner = sample::tracking().document().meta.target.point(0) - nalgebra::Vector3::z() * 0.05;
+    let mut off_m = [f64::INFINITY; 2];
+    for _ in 0..10 {
+        let reported = arm.arm.forward(&joints).expect("six joints");
+        let now = FollowMoment { joints: joints.into(), ..moment(30.0, reported) };
+        let ArmRequest::Towards(goal) = line.request(&now) else { panic!("it follows") };
+        joints = arm.arm.inverse(&goal.base_from_tip, &joints).expect("in reach")[..].try_into().expect("six");
+        let tips = [arm.actual(&joints).expect("six joints"), arm.arm.forward(&joints).expect("six joints")];
+        off_m = tips.map(|tip| (tip.translation() - (board.isometry() * corner).coords).norm());
+    }
+    assert!(off_m[0] < 1e-6 && off_m[1] > 1e-4, "{off_m:?}");
 }
 
 #[test]

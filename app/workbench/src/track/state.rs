@@ -8,6 +8,7 @@ use handeye_geometry::frames::{Base, Camera, Pose, Target};
 use handeye_track::Update;
 use serde::{Deserialize, Serialize};
 
+use super::worker::TrackedBy;
 use crate::text::Text;
 
 /// Points of the history that is shown: half a minute at the usual rates.
@@ -100,6 +101,11 @@ pub enum FollowStatus {
 pub struct TrackState {
     /// Whether images are tracked.
     pub on: bool,
+    /// By what; `None` while they are not.
+    pub by: Option<Arc<TrackedBy>>,
+    /// Whether tip poses, and what the arm is sent, shall be corrected for the errors of the arm; until a person says so they are where
+    /// that brings the tip nearer.
+    pub wants_corrected: Option<bool>,
     /// What the arm was asked for.
     pub request: Option<FollowRequest>,
     /// What the arm does.

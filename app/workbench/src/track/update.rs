@@ -7,10 +7,12 @@ use handeye_track::{MotionModel, Setup};
 use super::command::{Command, Event};
 use crate::app::Numbers;
 use crate::model::{
-    BoardMotion, FollowRequest, FollowStatus, MAX_TRACK_POINTS, Model, Motion, MotionId, MotionOutcome, Pane, Severity,
-    TrackPoint, Tracked,
+    BoardMotion, Corrected, FollowRequest, FollowStatus, MAX_TRACK_POINTS, Model, Motion, MotionId, MotionOutcome,
+    Pane, Severity, TrackPoint, Tracked,
 };
+use crate::motion::correction::{corrected, helpful};
 use crate::text::Text;
+use crate::track::worker::TrackedBy;
 use crate::worker::{ControlTask, Request, VisionTask, Workers};
 use handeye_wording::text;
 
@@ -22,6 +24,10 @@ pub(crate) fn apply(model: &mut Model, workers: &Workers, numbers: &mut Numbers,
     match command {
         Command::SetTracking(on) => set_tracking(model, workers, numbers, on),
         Command::SetFollow(request) => set_follow(model, workers, numbers, request),
+        Command::SetCorrected(wanted) => {
+            model.track.wants_corrected = Some(wanted);
+            reconsider_correction(model, workers);
+        }
         Command::MoveBoard(motion) => move_board(model, workers, motion),
         Command::HideBoard(hidden) => hide_board(model, workers, hidden),
     }
@@ -52,16 +58,41 @@ pub(crate) fn set_tracking(model: &mut Model, workers: &Workers, numbers: &mut N
     }
 }
 
+/// What corrects tip poses, and what the arm is sent.
+fn correcting(model: &Model) -> Option<&Corrected> {
+    match model.track.wants_corrected {
+        Some(wanted) => corrected(model).filter(|_| wanted).map(|(_, corrected)| corrected),
+        None => helpful(model),
+    }
+}
+
+/// Tracks by corrected tip poses, or no longer, where that has become another question: the robot reports again, or another arm. An arm
+/// that follows is left to what it began with.
+pub(crate) fn reconsider_correction(model: &mut Model, workers: &Workers) {
+    let corrects = model.track.by.as_ref().is_some_and(|by| by.arm.is_some());
+    if model.track.on
+        && model.track.request.is_none()
+        && model.robot.is_some()
+        && correcting(model).is_some() != corrects
+    {
+        send_tracking(model, workers);
+    }
+}
+
 /// Has the vision thread track with the newest calibration, or no more.
 pub(crate) fn send_tracking(model: &mut Model, workers: &Workers) {
-    let setup = model.calibrated().filter(|_| model.track.on).map(|calibrated| {
-        Box::new(Setup {
+    let corrected = correcting(model);
+    let calibrated = corrected.map_or_else(|| model.calibrated(), |corrected| Some(&corrected.calibrated));
+    let by = calibrated.filter(|_| model.track.on).map(|calibrated| TrackedBy {
+        setup: Setup {
             target: model.document().meta.target,
             calibrated: calibrated.clone(),
             motion: MotionModel::default(),
-        })
+        },
+        arm: corrected.map(|corrected| Arc::clone(&corrected.arm)),
     });
-    let asked = workers.ask_vision(VisionTask::Track(setup));
+    model.track.by = by.clone().map(Arc::new);
+    let asked = workers.ask_vision(VisionTask::Track(by.map(Box::new)));
     model.notify_if_refused(text!("Tracking was not changed"), asked);
 }
 

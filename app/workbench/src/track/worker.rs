@@ -2,13 +2,39 @@
 
 use std::sync::Arc;
 
-use handeye_geometry::frames::{Base, Pose, Target};
+use handeye_arm::JointValues;
+use handeye_estimate::corrected_arm::CorrectedArm;
+use handeye_geometry::frames::{Base, Pose, Target, Tip};
 use handeye_geometry::targets::TargetSpec;
 use handeye_track::{Image, Setup, TrackError as CannotTrack, Tracker};
 
 use super::follow_line::FollowLine;
 use crate::model::{TrackError, Tracked};
 use crate::worker::rate::RateMeter;
+
+/// What tracks, and the arm with its errors where tip poses are corrected for them: the board is then where it really is in the base.
+#[derive(Debug, Clone)]
+pub struct TrackedBy {
+    /// The target, the calibration that goes with these poses, and how boards move.
+    pub setup: Setup,
+    /// The arm with its errors.
+    pub arm: Option<Arc<CorrectedArm>>,
+}
+
+impl TrackedBy {
+    /// Where the tip is when it is reported there with these joint values; `None` where these are needed and are not of the arm.
+    pub fn base_from_tip(&self, reported: Pose<Base, Tip>, joints_rad: &JointValues) -> Option<Pose<Base, Tip>> {
+        self.arm.as_ref().map_or(Some(reported), |arm| arm.actual(joints_rad).ok())
+    }
+
+    /// What to command so that the tip gets there, by what it is off at these joint values: nearby it is off by the same, so that an arm
+    /// that comes to rest there is where it shall be. `None` as for [`Self::base_from_tip`].
+    pub fn command(&self, goal: Pose<Base, Tip>, joints_rad: &JointValues) -> Option<Pose<Base, Tip>> {
+        let Some(arm) = &self.arm else { return Some(goal) };
+        let actual_from_reported = arm.actual(joints_rad).ok()?.inverse() * arm.arm.forward(joints_rad).ok()?;
+        Some(goal * actual_from_reported)
+    }
+}
 
 /// An image with what is known of it.
 pub struct TrackedImage<'a> {
@@ -25,7 +51,7 @@ pub struct TrackedImage<'a> {
 /// A tracker at work.
 pub struct Tracking {
     tracker: Tracker,
-    target: TargetSpec,
+    by: TrackedBy,
     line: Arc<FollowLine>,
     rate: RateMeter,
 }
@@ -35,10 +61,14 @@ impl Tracking {
     ///
     /// # Errors
     /// As [`Tracker::new`].
-    pub fn new(setup: Setup, line: Arc<FollowLine>) -> Result<Self, CannotTrack> {
-        let target = setup.target;
-        line.set_up(Some(setup.clone()));
-        Ok(Self { tracker: Tracker::new(setup)?, target, line, rate: RateMeter::default() })
+    pub fn new(by: TrackedBy, line: Arc<FollowLine>) -> Result<Self, CannotTrack> {
+        line.set_up(Some(by.clone()));
+        Ok(Self { tracker: Tracker::new(by.setup.clone())?, by, line, rate: RateMeter::default() })
+    }
+
+    /// By what it tracks.
+    pub fn by(&self) -> &TrackedBy {
+        &self.by
     }
 
     /// The board in an image; `now_s` is on the clock of its arrival.
@@ -55,7 +85,7 @@ impl Tracking {
             .estimate
             .as_ref()
             .zip(truth)
-            .map(|(estimate, truth)| error_of(&estimate.base_from_target, &truth, &self.target));
+            .map(|(estimate, truth)| error_of(&estimate.base_from_target, &truth, &self.by.setup.target));
         Ok(Tracked {
             frame: sight.number,
             latency_s: published_s - sight.received_s,

@@ -45,7 +45,7 @@ pub use crate::session::desk::SessionThreads;
 pub use crate::solve::observer::ObserveJob;
 pub use crate::solve::worker::{SolveJob, answer, examined};
 pub use crate::track::follow_line::FollowLine;
-pub use crate::track::worker::{TrackedImage, Tracking};
+pub use crate::track::worker::{TrackedBy, TrackedImage, Tracking};
 pub use files::{ExportJob, FileTask};
 pub use handeye_link::{
     CameraPort, Cell, Connected, ControlPort, JogRequest, MotionPort, Newest, PortError, RawFrame, RemoteCell, Room,

@@ -12,6 +12,7 @@ use crate::model::{CellFacts, FollowRequest, FollowStatus, Link, LinkState, Moti
 use crate::motion::correction::Correction;
 use crate::testing::sample;
 use crate::text::{Language, Text};
+use crate::track::worker::TrackedBy;
 use crate::{connect, messages, motion, taught, track};
 
 /// A healthy worker answers within milliseconds; this is for a machine that does something else.
@@ -377,11 +378,12 @@ fn a_connection_that_breaks_ends_the_motion_and_the_jog() {
 /// The board of the sample is tracked.
 fn tracked(bench: &Bench) {
     let model = sample::tracking();
-    bench.workers.follow.set_up(Some(handeye_track::Setup {
+    let setup = handeye_track::Setup {
         target: model.document().meta.target,
         calibrated: model.calibrated().expect("calibrated").clone(),
         motion: handeye_track::MotionModel::default(),
-    }));
+    };
+    bench.workers.follow.set_up(Some(TrackedBy { setup, arm: None }));
     bench.workers.follow.see(&model.track.newest.as_ref().expect("tracked").update);
 }
 

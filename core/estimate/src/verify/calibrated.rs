@@ -6,7 +6,7 @@ use super::VerifyError;
 use crate::diagnose::Calibration;
 use crate::handeye::HandEye;
 use crate::handeye::joint::{
-    CornerWeights, DepthWeight, Free, Noise, PoseDependentError, SmallSample, camera_from_target,
+    ArmErrors, CornerWeights, DepthWeight, Free, Noise, PoseDependentError, SmallSample, camera_from_target,
     corrected_base_from_tip,
 };
 use crate::resolution;
@@ -32,6 +32,8 @@ pub struct Predictor {
     pub print_errors_m: Vec<Vector2<f64>>,
     /// Errors of the robot that depend on where it stands, where the calibration found them.
     pub field: Option<PoseDependentError>,
+    /// Errors of the robot's arm, where tip poses are corrected for them.
+    pub arm: Option<ArmErrors>,
     /// Covariance of the hand-eye transform, right perturbation `[t; r]`, where it is known.
     pub hand_eye_covariance: Option<Matrix6<f64>>,
     /// How the error of the hand-eye transform is distributed in units of that covariance.
@@ -65,6 +67,7 @@ impl Predictor {
             shape: BoardShape::default(),
             print_errors_m: Vec::new(),
             field: None,
+            arm: None,
             hand_eye_covariance: None,
             small_sample: SmallSample::KNOWN,
             uncertainty: None,
@@ -99,9 +102,34 @@ impl Predictor {
                 .and_then(|joint| joint.print.as_ref())
                 .map_or_else(Vec::new, |it| it.errors_m.clone()),
             field: joint.and_then(|joint| joint.field.clone()),
+            arm: None,
             hand_eye_covariance: calibration.link_covariances().map(|links| links.hand_eye),
             small_sample: joint.map_or(SmallSample::KNOWN, |joint| joint.small_sample),
             uncertainty,
+        })
+    }
+
+    /// The same with tip poses corrected for the errors of the arm, by the links, lens and target that go with them. `None` where the
+    /// calibration does not know them, see [`Fit::arm`](crate::Fit::arm).
+    pub fn of_arm(calibration: &Calibration) -> Option<Self> {
+        let (arm, reported) = (calibration.arm()?, Self::new(calibration).ok()?);
+        let uncertainty = reported.uncertainty?;
+        Some(Self {
+            hand_eye: arm.hand_eye,
+            intrinsics: arm.beside.intrinsics,
+            shape: arm.beside.shape,
+            print_errors_m: reported.print_errors_m,
+            field: arm.beside.field.clone(),
+            arm: Some(arm.errors.clone()),
+            hand_eye_covariance: Some(arm.covariance.fixed_view::<6, 6>(0, 0).into_owned()),
+            small_sample: arm.small_sample,
+            uncertainty: Some(Uncertainty {
+                noise: arm.noise,
+                depths: uncertainty.depths.map(|(_, weight)| (arm.beside.depth, weight)),
+                free: arm.beside.free,
+                covariance: arm.covariance.clone(),
+                ..uncertainty
+            }),
         })
     }
 
@@ -111,15 +139,18 @@ impl Predictor {
         if drawn.len() == self.print_errors_m.len() { drawn.displaced(&self.print_errors_m) } else { drawn }
     }
 
-    /// Where the tip is when the robot reports what it does in this view: with the robot's field taken out.
+    /// Where the tip is when the robot reports what it does in this view: with what is known of the robot's errors taken out.
     ///
     /// # Errors
-    /// [`VerifyError::NotFinite`].
+    /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] where the errors of the arm are known and its joints are not.
     pub fn base_from_tip(&self, view: &View) -> Result<Pose<Base, Tip>, VerifyError> {
         if !view.base_from_tip.is_finite() {
             return Err(VerifyError::NotFinite { name: view.name.clone() });
         }
-        Ok(corrected_base_from_tip(view, None, self.field.as_ref()))
+        if self.arm.as_ref().is_some_and(|arm| arm.joint_count() != view.tip_from_joints.len()) {
+            return Err(VerifyError::NoJoints { name: view.name.clone() });
+        }
+        Ok(corrected_base_from_tip(view, self.arm.as_ref(), self.field.as_ref()))
     }
 
     /// Where the camera is when the tip is there.

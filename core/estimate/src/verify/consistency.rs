@@ -2,7 +2,7 @@
 //!
 //! The pose error of a capture, `e_i = log(predicted⁻¹ * seen)`, is to first order
 //! `e_i = −G_i s − D_i d_i + n_i`: `s` the error of everything that the captures share (both links and whatever of lens,
-//! target, and the robot's field is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP, with
+//! target, the robot's field and the errors of its arm is free, covariance `C`), `d_i` the robot's noise and `n_i` what corner noise does to PnP, with
 //! `J` and the pose as seen weighed by what the detector states of each corner, as in the fit. With
 //! `B_i = D_i Σ_robot D_iᵀ + (corner_px² + view_px²) (JᵀJ)⁻¹` all errors together have the covariance `diag(B_i) + G C Gᵀ`, and
 //! `χ² = eᵀ (diag(B) + G C Gᵀ)⁻¹ e` has `6 n` degrees of freedom: its expectation is `6 n` and its standard deviation
@@ -71,7 +71,8 @@ impl Sums {
     pub fn new(calibrated: &Predictor, uncertainty: &Uncertainty) -> Option<Self> {
         let form = uncertainty.free.form();
         let slopes = if calibrated.field.is_some() { SLOPES } else { 0 };
-        let n = LINKS + form.count(&calibrated.intrinsics) + slopes;
+        let of_arm = calibrated.arm.as_ref().map_or(0, |arm| arm.values().len());
+        let n = LINKS + form.count(&calibrated.intrinsics) + slopes + of_arm;
         if uncertainty.covariance.shape() != (n, n) {
             return None;
         }
@@ -101,7 +102,7 @@ impl Sums {
         let chain = Chain::with_arm(
             calibrated.hand_eye.mode(),
             view,
-            None,
+            calibrated.arm.as_ref(),
             &calibrated.field.as_ref().map_or_else(Vector6::zeros, |field| field.correction(&view.base_from_tip)),
             &calibrated.hand_eye.mount_from_camera(),
             &calibrated.hand_eye.anchor_from_target(),
@@ -121,6 +122,8 @@ impl Sums {
             let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
             by_shared.columns_mut(LINKS + form, SLOPES).copy_from(&columns);
         }
+        let of_arm = chain.by_arm.ncols();
+        by_shared.columns_mut(self.covariance.nrows() - of_arm, of_arm).copy_from(&chain.by_arm);
         let own = chain.by_correction * Matrix6::from_diagonal(&self.robot_variance) * chain.by_correction.transpose()
             + pose_covariance * resolution::pose_variance_px2(self.corner_variance, view.corners.len());
         let error = se3::log((check.predicted_camera_from_target.inverse() * check.seen_camera_from_target).isometry());

@@ -12,7 +12,7 @@ use crate::{Method, Observations, Options};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::bent::BoardShape;
 use handeye_geometry::testing::BOARD;
-use handeye_simulate::session::{REALISTIC, Session, camera, trial};
+use handeye_simulate::session::{ArmError, REALISTIC, Session, Setup, camera, session, trial};
 
 /// A print that is so much larger than stated, as one that a printer "fits to the page".
 const SCALE: f64 = 1.024;
@@ -70,6 +70,81 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
         let truth = t.true_camera_from_target[0].isometry() * board.point(corner.index, &exact.shape);
         assert!((found.in_camera.point() - truth).norm() < 1e-8, "{} {truth}", found.in_camera.point());
     }
+}
+
+/// What is off about the links, in the convention of the simulation: `a`, `d` \[m\], `alpha`, zero \[rad\].
+const LINKS: [[f64; 4]; 6] = [
+    [4e-4, -8e-4, 16e-4, 0.0],
+    [-12e-4, 0.0, -36e-4, 5e-3],
+    [16e-4, 4e-4, 24e-4, -3e-3],
+    [0.0, 20e-4, -28e-4, 6e-3],
+    [4e-4, -4e-4, 20e-4, -4e-3],
+    [0.0, 8e-4, 0.0, 0.0],
+];
+
+fn off_by_its_links(mode: Mode, seed: u64) -> (Session, Calibration) {
+    // A robot that repeats well, as industrial ones do.
+    let noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
+    let arm_error = ArmError::Links(LINKS);
+    let t = session(&Setup { joints: true, arm_error, noise, ..Setup::new(mode, 40, seed) });
+    let mut observations = t.observations(false);
+    observations.views.truncate(20);
+    let calibration = solved(&observations, Options::default());
+    (t, calibration)
+}
+
+#[test]
+fn captures_are_predicted_by_corrected_tip_poses_as_well_as_the_errors_of_the_arm_are_known() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (t, calibration) = off_by_its_links(mode, 90);
+        let reported = check_all(&Predictor::new(&calibration).expect("complete"), &t.views[20..]);
+        let of_arm = Predictor::of_arm(&calibration).expect("its joints are known");
+        let corrected = check_all(&of_arm, &t.views[20..]);
+        let consistency = corrected.consistency.expect("it states an uncertainty");
+        println!(
+            "{mode:?}: {:.3} mm, corrected {:.3} mm, {consistency:?}",
+            reported.centre_rms_m * 1e3,
+            corrected.centre_rms_m * 1e3
+        );
+        assert!(corrected.centre_rms_m < 0.5 * reported.centre_rms_m, "{mode:?}");
+        assert!(consistency.is_consistent() && consistency.ratio > 0.3, "{mode:?}: {consistency:?}");
+
+        let unknown = View { tip_from_joints: Vec::new(), ..t.views[20].clone() };
+        let error = verify(&of_arm, &BOARD, &[&unknown], &CancelToken::default()).expect_err("no joints");
+        assert!(matches!(error, VerifyError::NoJoints { .. }), "{error}");
+    }
+}
+
+/// By finite differences over both ends of every principal axis.
+#[test]
+fn the_covariance_of_a_point_counts_the_errors_of_the_arm_with_those_of_the_camera() {
+    let (t, calibration) = off_by_its_links(Mode::EyeInHand, 91);
+    let of_arm = Predictor::of_arm(&calibration).expect("its joints are known");
+    let (view, px) = (&t.views[30], nalgebra::Vector2::new(100.0, 50.0));
+    let at = |calibrated: &Predictor| {
+        let tip = calibrated.arm.as_ref().expect("corrected").of_view(view);
+        let base_from_tip = Pose::from_isometry(view.base_from_tip.isometry() * tip.reported_from_true);
+        calibrated.point_at_depth(TipAt { base_from_tip, by_errors: tip.by_errors }, &px, 0.8).expect("a point")
+    };
+    let stated = at(&of_arm).covariance_in_base.expect("stated");
+    let fit = calibration.arm().expect("its joints are known");
+    let eigen = fit.links_and_errors_covariance().symmetric_eigen();
+    let mut expected = nalgebra::Matrix3::zeros();
+    for (axis, variance) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
+        let step = axis * variance.max(0.0).sqrt();
+        let moved = |sign: f64| {
+            let mut moved = of_arm.clone();
+            let links = &of_arm.hand_eye;
+            let by: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0) * sign;
+            moved.hand_eye = HandEye::new(t.mode, links.mount_from_camera().perturbed(&by), links.anchor_from_target());
+            let errors = moved.arm.as_mut().expect("corrected").values_mut();
+            errors.iter_mut().zip(step.iter().skip(12)).for_each(|(error, by)| *error += sign * by);
+            at(&moved).in_base.point()
+        };
+        let by = (moved(1.0) - moved(-1.0)) / 2.0;
+        expected += by * by.transpose();
+    }
+    assert!((stated - expected).norm() < 1e-3 * expected.norm(), "{stated} {expected}");
 }
 
 #[test]

@@ -27,7 +27,7 @@ use handeye_geometry::view_equations::{DepthBias, PredictedDepths};
 pub use calibrated::{Predictor, Uncertainty};
 pub use consistency::Consistency;
 pub use depth_camera::{DepthCheck, DepthErrors, DepthReport, Estimated};
-pub use points::MeasuredPoint;
+pub use points::{MeasuredPoint, TipAt};
 
 /// Why there is nothing to verify with.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, handeye_wording::Localized)]
@@ -53,6 +53,12 @@ pub enum VerifyError {
     /// A capture whose robot pose is not finite.
     #[error("the robot pose of capture {name:?} is not finite: capture it again")]
     NotFinite {
+        /// Which capture.
+        name: String,
+    },
+    /// A capture without the joints of the arm whose errors are known.
+    #[error("the joints of capture {name:?} are not known: capture it again with the robot connected")]
+    NoJoints {
         /// Which capture.
         name: String,
     },

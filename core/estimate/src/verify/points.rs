@@ -1,8 +1,9 @@
 //! A pixel as a point in the base.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3xX, Matrix6xX, Point3, Vector2, Vector3};
 
 use super::{Predictor, VerifyError};
+use crate::handeye::HandEye;
 use crate::handeye::joint::SmallSample;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, PointIn, Pose, Target, Tip};
@@ -15,8 +16,9 @@ pub struct MeasuredPoint {
     pub in_camera: PointIn<Camera>,
     /// In the base.
     pub in_base: PointIn<Base>,
-    /// Covariance in base axes, square metres, as far as the hand-eye transform causes it: the noise of this robot
-    /// pose, of the depth or the corners, and of the lens come on top. `None` when the calibration states none.
+    /// Covariance in base axes, square metres, as far as the hand-eye transform causes it, and the errors of the arm where the tip is
+    /// corrected for them: the noise of this robot pose, of the depth or the corners, and of the lens come on top. `None` when the
+    /// calibration states none.
     pub covariance_in_base: Option<Matrix3<f64>>,
     /// How the error is distributed in units of that covariance.
     pub small_sample: SmallSample,
@@ -35,6 +37,21 @@ impl MeasuredPoint {
     }
 }
 
+/// Where the tip is.
+#[derive(Debug, Clone)]
+pub struct TipAt {
+    /// As reported, or corrected for the errors of the arm.
+    pub base_from_tip: Pose<Base, Tip>,
+    /// The twists `[t; r]` on its right by which it turns with these errors; no columns where it is not corrected.
+    pub by_errors: Matrix6xX<f64>,
+}
+
+impl From<&Pose<Base, Tip>> for TipAt {
+    fn from(reported: &Pose<Base, Tip>) -> Self {
+        Self { base_from_tip: *reported, by_errors: Matrix6xX::zeros(0) }
+    }
+}
+
 impl Predictor {
     /// The point at `depth_m` along the optical axis on the ray of a pixel.
     ///
@@ -43,7 +60,7 @@ impl Predictor {
     /// [`VerifyError::Camera`] for a pixel outside the lens model.
     pub fn point_at_depth(
         &self,
-        base_from_tip: &Pose<Base, Tip>,
+        tip: impl Into<TipAt>,
         px: &Vector2<f64>,
         depth_m: f64,
     ) -> Result<MeasuredPoint, VerifyError> {
@@ -51,7 +68,7 @@ impl Predictor {
         if !(depth_m > 0.0 && depth_m.is_finite() && ray.z > 0.0) {
             return Err(VerifyError::BadDepth { depth_m });
         }
-        Ok(self.measured(base_from_tip, Point3::from(ray.into_inner() * (depth_m / ray.z))))
+        Ok(self.measured(&tip.into(), Point3::from(ray.into_inner() * (depth_m / ray.z))))
     }
 
     /// The point of the board's plane that a pixel sees, with the board's pose in this image by
@@ -62,21 +79,34 @@ impl Predictor {
     /// [`VerifyError::Camera`] for a pixel outside the lens model.
     pub fn point_on_board(
         &self,
-        base_from_tip: &Pose<Base, Tip>,
+        tip: impl Into<TipAt>,
         px: &Vector2<f64>,
         camera_from_target: &Pose<Camera, Target>,
     ) -> Result<MeasuredPoint, VerifyError> {
         let point = on_plane(&self.intrinsics, px, camera_from_target.isometry())?;
-        Ok(self.measured(base_from_tip, point))
+        Ok(self.measured(&tip.into(), point))
     }
 
-    fn measured(&self, base_from_tip: &Pose<Base, Tip>, in_camera: Point3<f64>) -> MeasuredPoint {
-        let base_from_camera = self.base_from_camera(base_from_tip);
+    fn measured(&self, tip: &TipAt, in_camera: Point3<f64>) -> MeasuredPoint {
+        let base_from_camera = self.base_from_camera(&tip.base_from_tip);
         let rotation = base_from_camera.rotation().to_rotation_matrix().into_inner();
-        let covariance_in_base = self
-            .hand_eye_covariance
-            .as_ref()
-            .map(|c| rotation * point_error::covariance(c, &in_camera) * rotation.transpose());
+        let by_hand_eye = rotation * point_error::by_hand_eye(&in_camera);
+        let covariance_in_base = match (&self.uncertainty, self.hand_eye) {
+            (Some(uncertainty), HandEye::EyeInHand { tip_from_camera, .. })
+                if self.arm.is_some() && uncertainty.covariance.nrows() >= 12 + tip.by_errors.ncols() =>
+            {
+                let in_tip = tip_from_camera.isometry() * in_camera;
+                let turn = tip.base_from_tip.rotation().to_rotation_matrix().into_inner();
+                let by_errors: Matrix3xX<f64> = turn * point_error::by_hand_eye(&in_tip) * &tip.by_errors;
+                let (all, count) = (uncertainty.covariance.nrows(), by_errors.ncols());
+                let mut by_shared = DMatrix::zeros(3, all);
+                by_shared.columns_mut(0, 6).copy_from(&by_hand_eye);
+                by_shared.columns_mut(all - count, count).copy_from(&by_errors);
+                let covariance = &by_shared * &uncertainty.covariance * by_shared.transpose();
+                Some(covariance.fixed_view::<3, 3>(0, 0).into_owned())
+            }
+            _ => self.hand_eye_covariance.as_ref().map(|c| by_hand_eye * c * by_hand_eye.transpose()),
+        };
         let in_camera = PointIn::new(in_camera);
         let in_base = base_from_camera * in_camera;
         MeasuredPoint { in_camera, in_base, covariance_in_base, small_sample: self.small_sample }

@@ -13,6 +13,7 @@ import numpy as np
 from . import _handeye
 from ._arrays import Array, covariance, floats, matrices, packed, transform
 from ._errors import CalibrationWarning, InputError
+from ._types import Intrinsics
 
 CONTRADICTED = (
     "views left out of the calibration are predicted worse by corrected poses than by reported ones: do not correct before more "
@@ -67,6 +68,8 @@ class Arm:
     """The camera on its mount, (4, 4), as `Calibration.hand_eye` has it, to be used with corrected poses alone."""
     target: Array
     """The target on its mount, (4, 4), likewise."""
+    intrinsics: Optional[Intrinsics]
+    """The lens that goes with hand_eye: estimated with the arm it is another one than `Calibration.intrinsics`."""
     hand_eye_covariance: Optional[Array]
     """Of hand_eye, (6, 6)."""
     target_covariance: Optional[Array]
@@ -95,6 +98,7 @@ class Arm:
             unexplained_deg=arm["unexplained"]["rotation_deg"],
             hand_eye=transform(arm["hand_eye"]),
             target=transform(arm["target"]),
+            intrinsics=Intrinsics._of(arm.get("intrinsics")),
             hand_eye_covariance=covariance(arm["hand_eye"]),
             target_covariance=covariance(arm["target"]),
             reach_error_95_mm=quality.get("reach_error_95_mm"),

@@ -107,8 +107,8 @@ class Calibration:
         Parameters
         ----------
         pose
-            base_from_tip that is wanted, (4, 4) or (N, 4, 4), metres. A pose that the camera gave comes from `arm.hand_eye` and
-            `actual`, not from `hand_eye` and reported poses.
+            base_from_tip that is wanted, (4, 4) or (N, 4, 4), metres. A pose that the camera gave comes from `arm.hand_eye`,
+            `arm.intrinsics` and `actual`, not from `hand_eye`, `intrinsics` and reported poses.
         near
             Joint values near which the arm shall be, (n,) or (N, n), radians: of several ways to reach a pose the nearest is taken.
             Where a pose has none, those of the pose before; the search for the first begins in the middle of the ranges.

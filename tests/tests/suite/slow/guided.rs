@@ -79,6 +79,12 @@ fn a_nominal_arm_reaches_the_goal_with_corrected_commands() {
     let goal = result.findings.iter().find(|finding| finding.code == "goal_reached").expect("it is found, too");
     assert!(goal.text.contains("handeye correct"), "{}", goal.text);
     assert!(result.views.len() <= 25, "{} views", result.views.len());
+    // The captures that check it say the same.
+    let checked = result.verification.expect("three captures");
+    let by_arm = checked.corrected.as_ref().expect("their joints are known");
+    assert!(by_arm.centre_rms_mm < 0.5 * checked.centre_rms_mm && by_arm.centre_rms_mm < 0.3, "{checked:?}");
+    assert_eq!(by_arm.as_stated, Some(true), "{checked:?}");
+    assert!(result.arm.is_some_and(|arm| arm.intrinsics.is_some()), "the lens that goes with the arm");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use handeye_cell::scene::ShippedScene;
 use handeye_coppeliasim::cell::{Arm, CellClient, CellPaths, MotionTolerance, SettleOptions};
 use handeye_coppeliasim::{CancelToken, ConnectionOptions, Endpoint, MotionLimits};
 use handeye_geometry::frames::{Base, Pose, Target};
@@ -143,11 +144,55 @@ fn our_point_and_the_tip_there_are_those_of_the_program_that_people_write_by_han
     assert!(apart_mm <= 1.0, "{apart_mm} mm");
 }
 
-/// Where every program begins: the first reference pose, at rest.
-fn at_first_pose(endpoint: &str) -> Arm {
+/// Without what is known of its arm the same calibration brings the tip where nominal kinematics has it.
+#[test]
+fn an_arm_whose_links_are_off_reaches_a_corner_by_corrected_commands() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let known = calibrated(folder.path(), "assets/scenes/nominal.toml");
+    let mut result = json(&known);
+    let stated_mm = number(&result["quality"], "reach_error_corrected_95_mm");
+    result["arm"] = Value::Null;
+    let unknown = folder.path().join("plain.json");
+    std::fs::write(&unknown, result.to_string()).expect("written");
+
+    let scene = ShippedScene::Nominal.scene().expect("it is shipped");
+    let scene = scene.resolve(scene.seed).expect("valid");
+    let cell = CellProcess::start(&["--fast", "--scene", "nominal"]);
+    let endpoint = format!("tcp://127.0.0.1:{}", cell.port());
+    let [plain_mm, corrected_mm] = [unknown, known].map(|calibration| {
+        drop(at_first_pose(&endpoint));
+        let calibration = calibration.display().to_string();
+        let to_corner = ["--reach", "0", "--stand-off", "0"];
+        handeye(
+            &[&["track", "--quiet", "--connect", &endpoint, "--calibration", &calibration][..], &to_corner].concat(),
+        );
+        let joints = connected(&endpoint).joint_values().expect("the joints");
+        let tip = scene.true_tip(&joints, 0).expect("six joints").translation();
+        let corner = |index| scene.base_from_target.isometry() * BOARD.point(index);
+        // A chessboard of this kind looks the same from two sides.
+        [0, BOARD.len() - 1]
+            .map(|index| (tip - corner(index).coords).norm() * 1e3)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    });
+    println!(
+        "the tip is {plain_mm:.3} mm off the corner, {corrected_mm:.3} mm with corrected commands, stated {stated_mm:.3}"
+    );
+    assert!(
+        corrected_mm < 0.5 * plain_mm && corrected_mm <= stated_mm,
+        "{plain_mm} mm, {corrected_mm} mm, {stated_mm} mm"
+    );
+}
+
+fn connected(endpoint: &str) -> Arm {
     let endpoint: Endpoint = endpoint.parse().expect("an address");
     let cell = CellClient::connect(&endpoint, &ConnectionOptions::default(), &CellPaths::default()).expect("a cell");
-    let (mut arm, _feed) = cell.split();
+    cell.split().0
+}
+
+/// Where every program begins: the first reference pose, at rest.
+fn at_first_pose(endpoint: &str) -> Arm {
+    let mut arm = connected(endpoint);
     arm.sim().start_simulation().expect("started");
     let file = workspace_root().join("assets/poses/seed10.toml");
     let poses = handeye_dataset::taught_poses::TaughtPoses::read(&file).expect("poses");

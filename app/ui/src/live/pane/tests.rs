@@ -17,6 +17,7 @@ use handeye_workbench::model::{
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
+use handeye_workbench::worker::TrackedBy;
 use handeye_workbench::{capture, live, session};
 
 fn colour(model: Model) -> PaneHarness {
@@ -391,6 +392,23 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     // Estimate and image are off by 0.2 mm and 0.07 px.
     assert!(apart_px(&model, &at(&model).expect("tracked")) < 1.0);
     assert!(apart_px(&model, &overlays::live_chain(&model).expect("seen")) < 1.0);
+
+    // By corrected tip poses it is as far from its place in the base as the tip is, and in the image where it was.
+    let mut corrected = model.clone();
+    let arm = sample::corrected_arm();
+    let tip = arm.actual(&frame.info.joints_rad).expect("six joints");
+    let reported = frame.info.base_from_tip.expect("the robot is known");
+    let mut newest = handeye_workbench::model::Tracked::clone(model.track.newest.as_ref().expect("tracked"));
+    if let Some(estimate) = &mut newest.update.estimate {
+        let board = tip.isometry() * reported.isometry().inverse() * estimate.base_from_target.isometry();
+        estimate.base_from_target = Pose::from_isometry(board);
+    }
+    corrected.track.newest = Some(Arc::new(newest));
+    assert!(apart_px(&corrected, &at(&corrected).expect("tracked")) > 1.0, "by the reported tip it is elsewhere");
+    let by = model.track.by.as_ref().expect("tracked");
+    let by = TrackedBy { arm: Some(Arc::new(arm)), ..TrackedBy::clone(by) };
+    corrected.track.by = Some(Arc::new(by));
+    assert!(apart_px(&corrected, &at(&corrected).expect("tracked")) < 1.0);
 
     // Out of sight there is nothing to compare with, and the calibrated board is not drawn in its place.
     let mut lost = model.clone();

@@ -13,7 +13,7 @@ use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, MotionGoal, RobotState};
 use handeye_workbench::motion;
-use handeye_workbench::motion::correction::{corrected_arm, real_tip};
+use handeye_workbench::motion::correction::{expected_mm, real_tip};
 use handeye_workbench::motion::way::Way;
 use handeye_workbench::tr;
 
@@ -155,13 +155,6 @@ pub fn typed_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Outb
         }
     });
     parts::remember(ui, id, typed);
-}
-
-/// What a tool arrives within by the controller as it is and by corrected commands, millimetres, 95 %; `None` where the errors of this arm
-/// are not known.
-fn expected_mm(model: &Model) -> Option<(f64, f64)> {
-    let quality = &corrected_arm(model)?.0.result.quality;
-    quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm)
 }
 
 /// Whether the errors of the arm are corrected, where they are known.

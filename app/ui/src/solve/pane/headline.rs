@@ -93,6 +93,13 @@ fn expected_error_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut O
         (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),
     };
     ui.add(Label::new(RichText::new(meaning).color(palette.weak)).wrap());
+    if error_mm.is_some() && solved.result.mode.is_some() && solved.result.arm.is_none() {
+        let reach = tr!(
+            language,
+            "How near a tool arrives is not known without the errors of the arm, which take its kinematics and the joint values of every capture."
+        );
+        ui.add(Label::new(RichText::new(reach).color(palette.text)).wrap());
+    }
     moved_ui(ui, model, solved, error_mm);
 }
 

@@ -8,6 +8,7 @@ use crate::style::{form, parts};
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{FollowRequest, FollowStatus, Model};
+use handeye_workbench::motion::correction::expected_mm;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::track;
@@ -51,7 +52,10 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
     let key = ui.id().with("follow choice");
     let mut choice: Choice = parts::remembered(ui, key);
     let follows = is_following(model);
-    ui.add_enabled_ui(!follows, |ui| choice_ui(ui, model, &mut choice));
+    ui.add_enabled_ui(!follows, |ui| {
+        choice_ui(ui, model, &mut choice);
+        corrected_ui(ui, model, outbox);
+    });
     parts::remember(ui, key, choice);
     ui.horizontal_wrapped(|ui| {
         if follows {
@@ -81,6 +85,15 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
         if again {
             outbox.send(track::Command::SetFollow(Some(choice.request())));
         }
+    }
+}
+
+/// Whether the errors of the arm are corrected, where they are known.
+fn corrected_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let Some((plain, corrected)) = expected_mm(model) else { return };
+    let mut is_corrected = model.track.wants_corrected.unwrap_or(corrected < plain);
+    if ui.checkbox(&mut is_corrected, tr!(model.view.language, "Correct for the errors of the arm")).changed() {
+        outbox.send(track::Command::SetCorrected(is_corrected));
     }
 }
 

@@ -41,6 +41,13 @@ pub fn pose_ui(ui: &mut Ui, model: &Model) {
         return;
     };
     parts::section_ui(ui, tr!(language, "Board in the base"));
+    if model.track.by.as_ref().is_some_and(|by| by.arm.is_some()) {
+        let how = tr!(
+            language,
+            "By tip poses corrected for the errors of the arm; what the arm is sent is corrected as well."
+        );
+        parts::hint_ui(ui, how);
+    }
     match &newest.update.estimate {
         Some(estimate) => estimate_ui(ui, estimate, model.view.rotation, language),
         None => parts::hint_ui(ui, tr!(language, "Where it is now is not known.")),

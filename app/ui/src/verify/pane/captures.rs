@@ -10,6 +10,7 @@ use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::Model;
 use handeye_workbench::session;
+use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
 /// Squared error over what is stated that one capture in a hundred exceeds.
@@ -20,7 +21,7 @@ pub fn captures_ui(
     ui: &mut Ui,
     model: &Model,
     captures: &[CaptureId],
-    verification: &Verification,
+    (verification, corrected): (&Verification, Option<&Verification>),
     outbox: &mut Outbox,
 ) {
     let language = model.view.language;
@@ -40,24 +41,29 @@ pub fn captures_ui(
             ui.label(RichText::new(heading).small().color(weak)).on_hover_text(what);
         }
         ui.end_row();
-        for (id, check) in captures.iter().zip(&verification.captures) {
+        for (at, (id, check)) in captures.iter().zip(&verification.captures).enumerate() {
             let name = text!("Capture {id}", id = id.0).in_language(language);
             let is_selected = model.selection.contains(id);
             if ui.selectable_label(is_selected, name).clicked() && !is_selected {
                 outbox.send(session::Command::Select(vec![*id]));
             }
-            check_ui(ui, check);
+            let corrected = corrected.and_then(|corrected| corrected.captures.get(at));
+            check_ui(ui, check, corrected, language);
             ui.end_row();
         }
     });
 }
 
-fn check_ui(ui: &mut Ui, check: &CaptureCheck) {
+fn millimetres(check: &CaptureCheck) -> String {
+    format!("{:.3}", check.centre_error_m.norm() * 1e3)
+}
+
+fn check_ui(ui: &mut Ui, check: &CaptureCheck, corrected: Option<&CaptureCheck>, language: Language) {
     let palette = Palette::of(ui);
     let known = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
     let is_unlikely = check.ratio.is_some_and(|ratio| ratio > UNLIKELY);
     let values = [
-        format!("{:.3}", check.centre_error_m.norm() * 1e3),
+        millimetres(check),
         format!("{:.3}", check.orientation_error_rad.to_degrees()),
         format!("{:.3}", check.rms_px),
         known(check.depth_error_m.map(|metres| numbers::fixed(metres * 1e3, 2, 0))),
@@ -65,6 +71,11 @@ fn check_ui(ui: &mut Ui, check: &CaptureCheck) {
     ];
     for (column, value) in values.into_iter().enumerate() {
         let colour = if column == 4 && is_unlikely { palette.warning } else { palette.text };
-        ui.label(RichText::new(value).monospace().size(12.0).color(colour));
+        let label = ui.label(RichText::new(value).monospace().size(12.0).color(colour));
+        if let Some(corrected) = corrected.filter(|_| column == 0) {
+            let what =
+                text!("{mm} mm by the tip pose corrected for the errors of the arm", mm = millimetres(corrected));
+            label.on_hover_text(what.in_language(language));
+        }
     }
 }

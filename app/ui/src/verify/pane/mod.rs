@@ -43,8 +43,9 @@ pub fn verify_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
                     let reported = tr!(language, "Out of date: this is from earlier captures or settings");
                     parts::notice_ui(ui, Tone::Warning, reported, |_| ());
                 }
-                summary::summary_ui(ui, model, verification);
-                captures::captures_ui(ui, model, &solved.verified_captures, verification, outbox);
+                let corrected = solved.corrected.as_ref().and_then(|corrected| corrected.verification.as_ref());
+                summary::summary_ui(ui, model, verification, corrected);
+                captures::captures_ui(ui, model, &solved.verified_captures, (verification, corrected), outbox);
             }
         }
         picked::picked_ui(ui, model, outbox);

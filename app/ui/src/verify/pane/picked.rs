@@ -10,7 +10,7 @@ use crate::style::parts;
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::live;
-use handeye_workbench::model::Model;
+use handeye_workbench::model::{MeasuredTwice, Model};
 use handeye_workbench::text::Text;
 use handeye_workbench::tr;
 
@@ -36,12 +36,22 @@ pub fn picked_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             outbox.send(live::Command::Pick(None));
         }
     });
-    point_ui(ui, model, tr!(language, "From depth [mm]"), &picked.from_depth);
-    point_ui(ui, model, tr!(language, "From the board [mm]"), &picked.from_board);
-    if let (Ok(depth), Ok(board)) = (&picked.from_depth, &picked.from_board) {
+    let MeasuredTwice { from_depth, from_board } = &picked.as_reported;
+    point_ui(ui, model, tr!(language, "From depth [mm]"), from_depth);
+    point_ui(ui, model, tr!(language, "From the board [mm]"), from_board);
+    if let (Ok(depth), Ok(board)) = (from_depth, from_board) {
         let difference_mm = (depth.in_base.point() - board.in_base.point()) * 1e3;
         parts::stated_ui(ui, tr!(language, "Difference [mm]"), &millimetres(&difference_mm));
         parts::stated_ui(ui, tr!(language, "Its length [mm]"), &numbers::fixed(difference_mm.norm(), 2, 8));
+    }
+    if let Some(corrected) = &picked.corrected {
+        let why = tr!(
+            language,
+            "With the tip pose corrected for the errors of the arm: for commands that are corrected as well, and no others:"
+        );
+        parts::hint_ui(ui, why);
+        point_ui(ui, model, tr!(language, "From depth, corrected [mm]"), &corrected.from_depth);
+        point_ui(ui, model, tr!(language, "From the board, corrected [mm]"), &corrected.from_board);
     }
     let solved = model.solve.solved.as_ref();
     let modelled =

@@ -7,28 +7,46 @@ use crate::style::parts;
 use crate::style::theme::Palette;
 use handeye_wording::text;
 use handeye_workbench::model::Model;
+use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 
 /// A ratio below that would be shown as zero.
 const LEAST_RATIO: f64 = 0.01;
 
-/// Errors of prediction, and whether they are as large as stated.
-pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification) {
+/// Errors of prediction, and whether they are as large as stated; also by corrected tip poses, where the errors of the arm are known.
+pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification, corrected: Option<&Verification>) {
     let language = model.view.language;
     let count = verification.captures.len();
     let title = text!("Errors of prediction over {count} {count|capture|captures}, RMS", count = count);
     parts::section_ui(ui, &title.in_language(language));
+    if corrected.is_some() {
+        let what =
+            tr!(language, "By the tip poses that the robot reports → by tip poses corrected for the errors of the arm");
+        parts::hint_ui(ui, what);
+    }
+    let both = |shown: &dyn Fn(&Verification) -> String| {
+        let corrected = corrected.map(|corrected| format!(" → {}", shown(corrected)));
+        shown(verification) + &corrected.unwrap_or_default()
+    };
     let mm = |metres: f64| format!("{:.3} mm", metres * 1e3);
-    parts::stated_ui(ui, tr!(language, "Middle of the board"), &mm(verification.centre_rms_m))
+    parts::stated_ui(ui, tr!(language, "Middle of the board"), &both(&|it| mm(it.centre_rms_m)))
         .on_hover_text(tr!(language, "Distance between the measured and the predicted middle of the board"));
-    let deg = verification.orientation_rms_rad.to_degrees();
-    parts::stated_ui(ui, tr!(language, "Its orientation"), &format!("{deg:.3}°"));
-    parts::stated_ui(ui, tr!(language, "Its corners"), &format!("{:.3} px", verification.rms_px));
-    let scatter = verification.origin_scatter_m.map_or_else(|| "–".to_owned(), mm);
-    parts::stated_ui(ui, tr!(language, "Scatter of its position"), &scatter).on_hover_text(tr!(
+    let deg = |it: &Verification| format!("{:.3}°", it.orientation_rms_rad.to_degrees());
+    parts::stated_ui(ui, tr!(language, "Its orientation"), &both(&deg));
+    parts::stated_ui(ui, tr!(language, "Its corners"), &both(&|it| format!("{:.3} px", it.rms_px)));
+    let scatter = |it: &Verification| it.origin_scatter_m.map_or_else(|| "–".to_owned(), mm);
+    parts::stated_ui(ui, tr!(language, "Scatter of its position"), &both(&scatter)).on_hover_text(tr!(
         language,
         "How much the position of the board differs from capture to capture. A board that was moved leaves it small while every prediction is wrong"
     ));
+    verdict_ui(ui, language, verification);
+    if let Some(corrected) = corrected {
+        parts::hint_ui(ui, tr!(language, "Corrected:"));
+        verdict_ui(ui, language, corrected);
+    }
+}
+
+fn verdict_ui(ui: &mut Ui, language: Language, verification: &Verification) {
     let palette = Palette::of(ui);
     let (colour, verdict) = match &verification.consistency {
         None => (palette.weak, text!("The calibration states no uncertainty to compare these errors with")),

@@ -8,7 +8,8 @@ use super::*;
 use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{
-    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, Pane, PickedPoint, PoseSequence, Severity, StopOutcome,
+    CaptureUnderWay, CaptureWait, Home, ImagePoint, LinkState, MeasuredTwice, Pane, PickedPoint, PoseSequence,
+    Severity, StopOutcome,
 };
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
@@ -114,7 +115,8 @@ fn a_picked_point_is_measured_twice_and_the_difference_is_stated() {
     let near = calibrated.point_at_depth(&base_from_tip, &px, 0.3).expect("a point");
     let far = calibrated.point_at_depth(&base_from_tip, &px, 0.31).expect("a point");
     let pixel = ImagePoint { column: 320, row: 240 };
-    model.picked = Some(PickedPoint { pixel, from_depth: Ok(near), from_board: Ok(far) });
+    let as_reported = MeasuredTwice { from_depth: Ok(near), from_board: Ok(far) };
+    model.picked = Some(PickedPoint { pixel, as_reported, corrected: None });
     let mut pane = driven(model);
     assert!(pane.sees("Pixel 320, 240"));
     assert!(pane.sees("± 1 σ [mm]"));
@@ -123,11 +125,32 @@ fn a_picked_point_is_measured_twice_and_the_difference_is_stated() {
     assert_eq!(pane.click("Clear the point"), [Command::Live(live::Command::Pick(None))]);
     let without = Text::verbatim("No depth at this pixel");
     if let Some(picked) = &mut pane.model().picked {
-        picked.from_depth = Err(without);
+        picked.as_reported.from_depth = Err(without);
     }
     pane.steps();
     assert!(pane.sees("No depth at this pixel"));
     assert!(!pane.sees("Difference"));
+}
+
+#[test]
+fn where_the_errors_of_the_arm_are_known_predictions_and_points_are_also_by_corrected_tip_poses() {
+    let mut model = sample::with_errors_of_the_arm();
+    let calibrated = model.calibrated().expect("calibrated").clone();
+    let base_from_tip = model.robot.as_ref().expect("a robot").base_from_tip;
+    let at =
+        |depth_m| calibrated.point_at_depth(&base_from_tip, &Vector2::new(320.0, 240.0), depth_m).expect("a point");
+    let twice = |depth_m| MeasuredTwice { from_depth: Ok(at(depth_m)), from_board: Ok(at(depth_m)) };
+    let pixel = ImagePoint { column: 320, row: 240 };
+    model.picked = Some(PickedPoint { pixel, as_reported: twice(0.3), corrected: Some(twice(0.31)) });
+    let solved = model.solve.solved.as_ref().expect("solved");
+    let reported = solved.verification.as_ref().and_then(|it| it.as_ref().ok()).expect("verified").centre_rms_m;
+    let pane = driven(model.clone());
+    assert!(pane.sees("By the tip poses that the robot reports → by tip poses corrected for the errors of the arm"));
+    let (mm, by_arm_mm) = (reported * 1e3, reported / 8.0 * 1e3);
+    assert!(pane.sees(&format!("Middle of the board: {mm:.3} mm → {by_arm_mm:.3} mm")) && pane.sees("Corrected:"));
+    assert!(pane.sees("From depth, corrected [mm]"));
+    assert!(pane.sees("for commands that are corrected as well, and no others"));
+    assert!(pane.nothing_is_cut_off());
 }
 
 const PLANNED: &str = "Verify at planned poses";

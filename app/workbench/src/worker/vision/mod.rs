@@ -15,7 +15,7 @@ use handeye_coppeliasim::CancelToken;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::TargetSpec;
 use handeye_images::gray_from_rgb;
-use handeye_track::{Image, Setup};
+use handeye_track::Image;
 use image::GrayImage;
 
 use search::Search;
@@ -25,7 +25,7 @@ use super::link::Outlet;
 use crate::capture::{CaptureRequest, Measured, Sequence, refusal};
 use crate::model::{CaptureRefused, CaptureWait, LiveDetection, LiveFrame, Tracked};
 use crate::track::follow_line::FollowLine;
-use crate::track::worker::{TrackedImage, Tracking};
+use crate::track::worker::{TrackedBy, TrackedImage, Tracking};
 use crate::{capture, track};
 
 /// How often the clock is looked at while a capture waits for images that do not come.
@@ -43,7 +43,7 @@ pub enum VisionTask {
     /// Give up the capture that is under way.
     CancelCapture,
     /// Track the board, instead of only finding it; `None` does so no more. A capture goes before.
-    Track(Option<Box<Setup>>),
+    Track(Option<Box<TrackedBy>>),
 }
 
 /// Where the newest sights of the board are put.
@@ -159,7 +159,7 @@ impl Vision {
                 }
             }
             VisionTask::CancelCapture => self.refuse(refusal::cancelled()),
-            VisionTask::Track(setup) => self.track(setup),
+            VisionTask::Track(by) => self.track(by),
         }
         if self.shutdown.is_cancelled() { Err(Ended) } else { Ok(()) }
     }
@@ -185,11 +185,11 @@ impl Vision {
         Ok(())
     }
 
-    fn track(&mut self, setup: Option<Box<Setup>>) {
+    fn track(&mut self, by: Option<Box<TrackedBy>>) {
         // The tracker before takes its leave of the arm first.
         self.tracking = None;
-        let Some(setup) = setup else { return };
-        match Tracking::new(*setup, Arc::clone(&self.sights.follow)) {
+        let Some(by) = by else { return };
+        match Tracking::new(*by, Arc::clone(&self.sights.follow)) {
             Ok(tracking) => self.tracking = Some(tracking),
             Err(error) => self.outlet.report(track::Event::Failed { why: error.into() }),
         }
@@ -199,7 +199,8 @@ impl Vision {
         let Some(tracking) = &mut self.tracking else { return };
         let info = &frame.info;
         // A board without a pose of the robot has no place in the base.
-        let Some(base_from_tip) = info.base_from_tip else { return };
+        let Some(reported) = info.base_from_tip else { return };
+        let Some(base_from_tip) = tracking.by().base_from_tip(reported, &info.joints_rad) else { return };
         let began_s = self.outlet.now_s();
         let sight = TrackedImage {
             number: info.number,
@@ -221,6 +222,7 @@ impl Vision {
                     corners: seen.map(|seen| seen.corners.clone()),
                     camera_from_target: seen.map(|seen| seen.camera_from_target),
                     base_from_tip: info.base_from_tip,
+                    joints_rad: info.joints_rad,
                     took_s: self.outlet.now_s() - began_s,
                     problem: None,
                     dropped,

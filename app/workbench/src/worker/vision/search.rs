@@ -43,6 +43,7 @@ impl Search {
             corners,
             camera_from_target,
             base_from_tip: frame.info.base_from_tip,
+            joints_rad: frame.info.joints_rad,
             took_s: began.elapsed().as_secs_f64(),
             problem,
             dropped,

@@ -93,7 +93,7 @@ impl ViewModel {
     /// The same with the errors of the arm among the unknowns; `None` where the calibration does not know them, see [`Fit::arm`].
     pub fn of_arm(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let arm = calibration.arm()?;
-        let BesideArm { intrinsics, shape, field, free } = arm.beside.clone();
+        let BesideArm { intrinsics, shape, field, free, .. } = arm.beside.clone();
         let free = Free { depth: false, ..free };
         let layout = Layout {
             form: free.form().count(&intrinsics),
