@@ -8,17 +8,8 @@ use crate::diagnose::Calibration;
 use crate::diagnose::findings::{FindingCode, FindingOptions, findings};
 use crate::handeye::Mode;
 use crate::handeye::joint::camera_from_target;
+use crate::test_sessions::OFF_LINKS;
 use crate::{Method, fit as calibrated};
-
-/// What is off about the links of a usual arm, by another convention than the estimator's: `a`, `d` \[m\], `alpha`, zero \[rad\].
-const LINKS: [[f64; 4]; 6] = [
-    [1e-4, -2e-4, 4e-4, 0.0],
-    [-3e-4, 0.0, -9e-4, 1.2e-3],
-    [4e-4, 1e-4, 6e-4, -8e-4],
-    [0.0, 5e-4, -7e-4, 1.5e-3],
-    [1e-4, -1e-4, 5e-4, -1e-3],
-    [0.0, 2e-4, 0.0, 0.0],
-];
 
 /// RMS of the residuals of views that were not in the fit, pixels, by reported poses and by corrected ones.
 fn predicted(of: &Setup, fitted: usize) -> (ArmFit, [f64; 2]) {
@@ -56,7 +47,7 @@ fn with(mode: Mode, arm_error: ArmError, seed: u64) -> Setup {
 #[test]
 fn corrected_poses_predict_what_reported_ones_do_not() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
-        let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::Links(LINKS), 5), 20);
+        let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::Links(OFF_LINKS), 5), 20);
         println!("{mode:?}: {reported:.3} → {corrected:.3} px, levels {:?}", arm.noise);
         // Corners and robot alone are 0.15 to 0.2 px.
         assert!(corrected < 0.8 * reported && corrected < 0.3, "{mode:?}: {reported} → {corrected} px");
@@ -77,7 +68,7 @@ fn the_error_of_a_camera_on_an_arm_counts_what_the_arm_is_off_and_more_views_are
         let goal = found.into_iter().find(|finding| finding.code == FindingCode::GoalNotReached);
         (calibration, goal.map(|finding| finding.to_string()).unwrap_or_default())
     };
-    let links = LINKS.map(|row| row.map(|value| 4.0 * value));
+    let links = OFF_LINKS.map(|row| row.map(|value| 4.0 * value));
     let ((off, said_of_off), (exact, said_of_exact)) = (of(ArmError::Links(links)), of(ArmError::None));
     let (by_noise, stated) = (off.modelled_error_95_m().expect("joint"), off.tip_error_95_m().expect("joint"));
     let apart = off.moved_by_arm_m().expect("the links are off");

@@ -62,6 +62,16 @@ pub(super) fn reported(app: &App) -> String {
     app.model().messages.newest().map_or_else(String::new, |message| message.text.in_language(Language::English))
 }
 
+/// Collects what the threads report until the model is like that.
+fn until(app: &mut App, is_so: impl Fn(&Model) -> bool) {
+    let deadline = Instant::now() + Duration::from_mins(1);
+    while !is_so(app.model()) {
+        assert!(Instant::now() < deadline, "{}", reported(app));
+        app.collect();
+        std::thread::yield_now();
+    }
+}
+
 /// A scene is read when a connection is made, so another scene takes another connection; the built-in cell has one scene, and
 /// a new connection would be a new cell.
 #[test]
@@ -149,19 +159,11 @@ fn leaving_brakes_an_arm_that_it_moves_and_leaves_the_arm_of_others_alone() {
         let cell = FakeCell::new(0);
         cell.script().motions = FakeMotions::Hang;
         let mut bench = bench(&cell);
-        let deadline = Instant::now() + Duration::from_mins(1);
-        let until = |app: &mut App, is_so: &dyn Fn(&Model) -> bool| {
-            while !is_so(app.model()) {
-                assert!(Instant::now() < deadline, "{}", reported(app));
-                app.collect();
-                std::thread::yield_now();
-            }
-        };
-        until(&mut bench.app, &|model| model.control.is_connected() && model.mover.is_connected());
+        until(&mut bench.app, |model| model.control.is_connected() && model.mover.is_connected());
         if moves {
             let goal = MotionGoal::Joints([0.5; 6].into());
             bench.app.apply(motion::Command::Move { goal, what: Text::verbatim("there") });
-            until(&mut bench.app, &|_| !cell.script().moved.is_empty());
+            until(&mut bench.app, |_| !cell.script().moved.is_empty());
         }
         let began = Instant::now();
         drop(bench);
@@ -605,16 +607,8 @@ fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
     let (cell, release) = FakeCell::that_never_answers();
     let mut bench = bench(&cell);
     let folder = bench._sessions.path().join("named");
-    let deadline = Instant::now() + Duration::from_mins(1);
-    let until = |app: &mut App, is_so: &dyn Fn(&Model) -> bool| {
-        while !is_so(app.model()) {
-            assert!(Instant::now() < deadline, "{}", reported(app));
-            app.collect();
-            std::thread::yield_now();
-        }
-    };
     open_or_begin(&mut bench.app.cx.model, &bench.app.cx.desk, folder.clone());
-    until(&mut bench.app, &|model| model.session.folder.is_some());
+    until(&mut bench.app, |model| model.session.folder.is_some());
     bench.app.apply(session::Command::SetMode(Mode::EyeToHand));
     let known = sample::connected().cell.expect("connected");
     let panda = ShippedScene::Panda.scene().and_then(|scene| scene.resolve(0)).expect("it is shipped");
@@ -624,11 +618,10 @@ fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
         let arm = start::arm(facts.arm.as_ref());
         assert!(arm.is_some());
         bench.app.absorb(connect::Event::Cell(Box::new(facts)));
-        until(&mut bench.app, &|model| model.document().meta.arm == arm);
+        until(&mut bench.app, |model| model.document().meta.arm == arm);
         bench.app.absorb(connect::Event::Cell(Box::new(undecided.clone())));
     }
-    let state = |app: &App| app.model().document().meta.clone();
-    let kept = state(&bench.app);
+    let kept = bench.app.model().document().meta.clone();
     let meta = &handeye_session::Session::open(&folder).expect("a session").document.meta;
     assert_eq!((&kept, meta.mode), (meta, Mode::EyeToHand));
     drop(release);

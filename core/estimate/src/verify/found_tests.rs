@@ -8,6 +8,7 @@ use crate::diagnose::findings::FindingOptions;
 use crate::diagnose::{Calibration, calibrate_with};
 use crate::handeye::joint::{Noise, SmallSample};
 use crate::handeye::{HandEye, Mode};
+use crate::test_sessions::OFF_LINKS;
 use crate::{Method, Observations, Options};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::bent::BoardShape;
@@ -72,20 +73,10 @@ fn a_board_that_is_larger_than_stated_is_seen_where_it_is() {
     }
 }
 
-/// What is off about the links, in the convention of the simulation: `a`, `d` \[m\], `alpha`, zero \[rad\].
-const LINKS: [[f64; 4]; 6] = [
-    [4e-4, -8e-4, 16e-4, 0.0],
-    [-12e-4, 0.0, -36e-4, 5e-3],
-    [16e-4, 4e-4, 24e-4, -3e-3],
-    [0.0, 20e-4, -28e-4, 6e-3],
-    [4e-4, -4e-4, 20e-4, -4e-3],
-    [0.0, 8e-4, 0.0, 0.0],
-];
-
 fn off_by_its_links(mode: Mode, seed: u64) -> (Session, Calibration) {
     // A robot that repeats well, as industrial ones do.
     let noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
-    let arm_error = ArmError::Links(LINKS);
+    let arm_error = ArmError::Links(OFF_LINKS.map(|row| row.map(|value| 4.0 * value)));
     let t = session(&Setup { joints: true, arm_error, noise, ..Setup::new(mode, 40, seed) });
     let mut observations = t.observations(false);
     observations.views.truncate(20);
