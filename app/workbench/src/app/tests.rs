@@ -32,7 +32,7 @@ use handeye_coppeliasim::cell::ArmKinematics;
 
 pub(super) struct Bench {
     pub app: App,
-    _sessions: tempfile::TempDir,
+    sessions: tempfile::TempDir,
 }
 
 pub(super) fn bench(cell: &FakeCell) -> Bench {
@@ -55,7 +55,7 @@ fn bench_with(connect: Connect) -> Bench {
         open: None,
         in_browser: None,
     };
-    Bench { app: App::start(start, connect, clock, waker).expect("threads"), _sessions: sessions }
+    Bench { app: App::start(start, connect, clock, waker).expect("threads"), sessions }
 }
 
 pub(super) fn reported(app: &App) -> String {
@@ -606,7 +606,7 @@ fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
     // The cell says nothing by itself.
     let (cell, release) = FakeCell::that_never_answers();
     let mut bench = bench(&cell);
-    let folder = bench._sessions.path().join("named");
+    let folder = bench.sessions.path().join("named");
     open_or_begin(&mut bench.app.cx.model, &bench.app.cx.desk, folder.clone());
     until(&mut bench.app, |model| model.session.folder.is_some());
     bench.app.apply(session::Command::SetMode(Mode::EyeToHand));
