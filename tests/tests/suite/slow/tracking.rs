@@ -144,28 +144,24 @@ fn our_point_and_the_tip_there_are_those_of_the_program_that_people_write_by_han
     assert!(apart_mm <= 1.0, "{apart_mm} mm");
 }
 
-/// Without what is known of its arm the same calibration brings the tip where nominal kinematics has it.
+/// As it is reported the same calibration brings the tip where nominal kinematics has it.
 #[test]
 fn an_arm_whose_links_are_off_reaches_a_corner_by_corrected_commands() {
     let folder = tempfile::tempdir().expect("a folder");
-    let known = calibrated(folder.path(), "assets/scenes/nominal.toml");
-    let mut result = json(&known);
-    let stated_mm = number(&result["quality"], "reach_error_corrected_95_mm");
-    result["arm"] = Value::Null;
-    let unknown = folder.path().join("plain.json");
-    std::fs::write(&unknown, result.to_string()).expect("written");
+    let calibration = calibrated(folder.path(), "assets/scenes/nominal.toml");
+    let stated_mm = number(&json(&calibration)["quality"], "reach_error_corrected_95_mm");
+    let (calibration, file) = (calibration.display().to_string(), folder.path().join("track.json"));
+    let out = file.display().to_string();
 
     let scene = ShippedScene::Nominal.scene().expect("it is shipped");
     let scene = scene.resolve(scene.seed).expect("valid");
     let cell = CellProcess::start(&["--fast", "--scene", "nominal"]);
     let endpoint = format!("tcp://127.0.0.1:{}", cell.port());
-    let [plain_mm, corrected_mm] = [unknown, known].map(|calibration| {
+    let to_corner = ["track", "--quiet", "--connect", &endpoint, "--reach", "0", "--stand-off", "0", "--json", &out];
+    let [plain_mm, corrected_mm] = [("reported", &["--as-reported"][..]), ("corrected", &[])].map(|(poses, asked)| {
         drop(at_first_pose(&endpoint));
-        let calibration = calibration.display().to_string();
-        let to_corner = ["--reach", "0", "--stand-off", "0"];
-        handeye(
-            &[&["track", "--quiet", "--connect", &endpoint, "--calibration", &calibration][..], &to_corner].concat(),
-        );
+        handeye(&[&to_corner[..], &["--calibration", &calibration], asked].concat());
+        assert_eq!(json(&file)["summary"]["tip_poses"], poses);
         let joints = connected(&endpoint).joint_values().expect("the joints");
         let tip = scene.true_tip(&joints, 0).expect("six joints").translation();
         let corner = |index| scene.base_from_target.isometry() * BOARD.point(index);
