@@ -95,11 +95,15 @@ impl CalibrationResult {
             ("quality.robot_sigma_mm", q.robot_sigma_mm),
             ("quality.robot_sigma_deg", q.robot_sigma_deg),
         ];
-        let corrected = self.verification.as_ref().and_then(|verification| verification.corrected.as_deref());
-        for verification in self.verification.iter().chain(corrected) {
+        if let Some(verification) = &self.verification {
             numbers.push(("verification.rms_px", Some(verification.rms_px)));
             numbers.push(("verification.centre_rms_mm", Some(verification.centre_rms_mm)));
             numbers.push(("verification.orientation_rms_deg", Some(verification.orientation_rms_deg)));
+            if let Some(corrected) = &verification.corrected {
+                numbers.push(("verification.corrected.rms_px", Some(corrected.rms_px)));
+                numbers.push(("verification.corrected.centre_rms_mm", Some(corrected.centre_rms_mm)));
+                numbers.push(("verification.corrected.orientation_rms_deg", Some(corrected.orientation_rms_deg)));
+            }
         }
         if let Some(depth) = &self.depth {
             numbers.push(("depth.fill", Some(depth.fill)));

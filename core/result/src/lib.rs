@@ -250,6 +250,14 @@ pub struct Quality {
     pub robot_sigma_deg: Option<f64>,
 }
 
+impl Quality {
+    /// Whether corrected commands are expected to bring a tool nearer than the controller as it is.
+    pub fn correcting_helps(&self) -> bool {
+        let reach = self.reach_error_95_mm.zip(self.reach_error_corrected_95_mm);
+        reach.is_some_and(|(as_it_is, corrected)| corrected < as_it_is)
+    }
+}
+
 /// What one closed-form solver says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MethodRecord {

@@ -67,9 +67,7 @@ pub fn read(path: &Path) -> Result<Read, Failure> {
         small_sample: small_sample(&result),
         uncertainty: None,
     };
-    let quality = &result.quality;
-    let reach = quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm);
-    let helps = |arm: &&ArmEstimate| !arm.contradicted && reach.is_some_and(|(plain, corrected)| corrected < plain);
+    let helps = |arm: &&ArmEstimate| !arm.contradicted && result.quality.correcting_helps();
     let corrected = result.arm.as_ref().filter(helps).and_then(|arm| {
         let (hand_eye, covariance) = links_of(result.mode?, &arm.hand_eye, &arm.target)?;
         let corrected = arm.corrected_arm().ok()?;

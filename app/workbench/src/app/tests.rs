@@ -633,6 +633,33 @@ fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
     drop(release);
 }
 
+#[test]
+fn tracking_corrects_for_the_arm_that_stands_here_as_long_as_a_person_wants_that_and_the_arm_does_not_follow() {
+    let (cell, release) = FakeCell::that_never_answers();
+    let mut bench = bench(&cell);
+    bench.app.cx.model = sample::with_errors_of_the_arm();
+    let corrects = |app: &App| app.model().track.by.as_ref().is_some_and(|by| by.arm.is_some());
+    bench.app.apply(track::Command::SetTracking(true));
+    assert!(corrects(&bench.app));
+    bench.app.apply(track::Command::SetCorrected(false));
+    assert!(!corrects(&bench.app));
+    bench.app.apply(track::Command::SetCorrected(true));
+    assert!(corrects(&bench.app));
+
+    // With another tool than that of the answer the tip is elsewhere.
+    let robot = sample_robot();
+    let tool = Pose::from_translation_xyzw([0.0, 0.0, 0.01], [0.0, 0.0, 0.0, 1.0]);
+    let other = RobotState { base_from_tip: robot.base_from_tip * tool, ..robot.clone() };
+    bench.app.absorb(connect::Event::Robot(other.clone()));
+    assert!(!corrects(&bench.app));
+    bench.app.absorb(connect::Event::Robot(robot));
+    assert!(corrects(&bench.app));
+    bench.app.cx.model.track.request = Some(FollowRequest::KeepView);
+    bench.app.absorb(connect::Event::Robot(other));
+    assert!(corrects(&bench.app), "an arm that follows goes on as it began");
+    drop(release);
+}
+
 fn sample_robot() -> RobotState {
     sample::connected().robot.expect("connected")
 }

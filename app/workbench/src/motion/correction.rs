@@ -35,8 +35,8 @@ pub fn expected_mm(model: &Model) -> Option<(f64, f64)> {
 
 /// What goes with corrected commands, where these are expected to bring the tip nearer.
 pub fn helpful(model: &Model) -> Option<&Corrected> {
-    let (plain, by_corrected) = expected_mm(model)?;
-    corrected(model).filter(|_| by_corrected < plain).map(|(_, corrected)| corrected)
+    let (solved, corrected) = corrected(model)?;
+    solved.result.quality.correcting_helps().then_some(corrected)
 }
 
 /// Where the tip really is.

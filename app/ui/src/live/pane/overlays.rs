@@ -1,6 +1,7 @@
 //! What is drawn over the colour image: corners, axes, the predicted board, coverage, residuals.
 
 use egui::{Color32, Id, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2};
+use handeye_estimate::verify::Predictor;
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::statistics::median_high;
 use handeye_geometry::targets::TargetSpec;
@@ -144,25 +145,24 @@ fn axes(painter: &Painter, projector: &Projector<'_>, target: &TargetSpec, stren
 }
 
 /// Where the board is expected in the image that is shown: where tracking has it in the live one while it is tracked,
-/// because it may then be anywhere; otherwise where robot pose and calibration say that it is.
-pub fn expected(model: &Model, shown: &Shown<'_>) -> Option<Pose<Camera, Target>> {
+/// because it may then be anywhere; otherwise where robot pose and calibration say that it is. With the calibration that it is by.
+pub fn expected<'a>(model: &'a Model, shown: &Shown<'_>) -> Option<(&'a Predictor, Pose<Camera, Target>)> {
     let base_from_tip = shown.base_from_tip.as_ref()?;
     if shown.capture.is_some() || !model.track.on {
-        return Some(model.calibrated()?.camera_from_target(base_from_tip));
+        let calibrated = model.calibrated()?;
+        return Some((calibrated, calibrated.camera_from_target(base_from_tip)));
     }
     let by = model.track.by.as_ref()?;
     let info = &model.frame.as_ref()?.info;
     let base_from_tip = by.base_from_tip(*base_from_tip, &info.joints_rad)?;
     let now = model.track.newest.as_ref()?.update.estimate.as_ref()?.carried_to(info.sim_time_s);
-    Some(by.setup.calibrated.base_from_camera(&base_from_tip).inverse() * now.base_from_target)
+    let calibrated = &by.setup.calibrated;
+    Some((calibrated, calibrated.base_from_camera(&base_from_tip).inverse() * now.base_from_target))
 }
 
 /// The board where it is expected.
 fn predicted(painter: &Painter, model: &Model, shown: &Shown<'_>, target: &TargetSpec, place: &Place) {
-    let is_tracked = shown.capture.is_none() && model.track.on;
-    let by = model.track.by.as_ref().filter(|_| is_tracked).map(|by| &by.setup.calibrated);
-    let Some(calibrated) = by.or_else(|| model.calibrated()) else { return };
-    let Some(camera_from_target) = expected(model, shown) else { return };
+    let Some((calibrated, camera_from_target)) = expected(model, shown) else { return };
     let projector = Projector { intrinsics: &calibrated.intrinsics, camera_from_target, place };
     // An answer of another set of captures is drawn, but does not shine.
     let colour = Marks::over_images().predicted.gamma_multiply(if model.solve.fresh { 1.0 } else { 0.5 });

@@ -386,7 +386,7 @@ fn while_the_board_is_tracked_prediction_and_residuals_are_those_of_the_tracked_
     let frame = model.frame.as_ref().expect("live").clone();
     let calibrated = model.calibrated().expect("calibrated").clone();
     let textures = LiveTextures::default();
-    let at = |model: &Model| overlays::expected(model, &Shown::of(model, &textures).expect("live"));
+    let at = |model: &Model| Some(overlays::expected(model, &Shown::of(model, &textures).expect("live"))?.1);
     let of_calibration = calibrated.camera_from_target(&frame.info.base_from_tip.expect("the robot is known"));
     assert!(apart_px(&model, &of_calibration) > 20.0, "the calibrated board is elsewhere");
     // Estimate and image are off by 0.2 mm and 0.07 px.

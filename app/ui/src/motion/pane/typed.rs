@@ -13,7 +13,7 @@ use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, MotionGoal, RobotState};
 use handeye_workbench::motion;
-use handeye_workbench::motion::correction::{expected_mm, real_tip};
+use handeye_workbench::motion::correction::{corrected, expected_mm, real_tip};
 use handeye_workbench::motion::way::Way;
 use handeye_workbench::tr;
 
@@ -86,8 +86,8 @@ impl Typed {
     }
 
     fn is_corrected(&self, model: &Model) -> bool {
-        let expected = self.is_tip.then(|| expected_mm(model)).flatten();
-        expected.is_some_and(|(plain, corrected)| self.corrected.unwrap_or(corrected < plain))
+        let known = self.is_tip.then(|| corrected(model)).flatten();
+        known.is_some_and(|(solved, _)| self.corrected.unwrap_or(solved.result.quality.correcting_helps()))
     }
 
     fn way(&self, model: &Model) -> Option<Way> {

@@ -8,7 +8,7 @@ use crate::style::{form, parts};
 use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{FollowRequest, FollowStatus, Model};
-use handeye_workbench::motion::correction::expected_mm;
+use handeye_workbench::motion::correction::corrected;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
 use handeye_workbench::track;
@@ -90,8 +90,9 @@ pub fn follow_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, outbox: &mut Out
 
 /// Whether the errors of the arm are corrected, where they are known.
 fn corrected_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
-    let Some((plain, corrected)) = expected_mm(model) else { return };
-    let mut is_corrected = model.track.wants_corrected.unwrap_or(corrected < plain);
+    let Some((solved, _)) = corrected(model) else { return };
+    let helps = solved.result.quality.correcting_helps();
+    let mut is_corrected = model.track.wants_corrected.unwrap_or(helps);
     if ui.checkbox(&mut is_corrected, tr!(model.view.language, "Correct for the errors of the arm")).changed() {
         outbox.send(track::Command::SetCorrected(is_corrected));
     }

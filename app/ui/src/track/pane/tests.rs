@@ -15,6 +15,7 @@ use handeye_workbench::model::{
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::Text;
 use handeye_workbench::track;
+use handeye_workbench::worker::TrackedBy;
 
 fn driven(model: Model) -> Driven {
     Driven::new(track_ui, model)
@@ -132,6 +133,26 @@ fn the_error_is_told_against_the_truth_of_the_simulator_and_only_where_there_is_
     assert!(pane.harness.query_by_label("x, y, z about their means [mm]").is_some());
     newest(&mut pane, |tracked| tracked.error = None);
     assert!(!pane.sees("Against the simulator's truth"));
+}
+
+#[test]
+fn where_the_errors_of_the_arm_are_known_a_person_chooses_whether_they_are_corrected() {
+    const SWITCH: &str = "Correct for the errors of the arm";
+    let mut model = tracked();
+    assert!(!driven(model.clone()).sees(SWITCH));
+    let known = sample::with_errors_of_the_arm();
+    (model.solve, model.robot) = (known.solve, known.robot);
+    let mut pane = driven(model);
+    assert!(!pane.sees("By tip poses corrected for the errors of the arm"), "it is not tracked by them yet");
+    assert_eq!(pane.click(SWITCH), [Command::Track(track::Command::SetCorrected(false))]);
+    pane.model().track.wants_corrected = Some(false);
+    pane.steps();
+    assert_eq!(pane.click(SWITCH), [Command::Track(track::Command::SetCorrected(true))]);
+    let by = pane.model().track.by.as_ref().map(|by| TrackedBy::clone(by)).expect("tracked");
+    let by = TrackedBy { arm: Some(Arc::new(sample::corrected_arm())), ..by };
+    pane.model().track.by = Some(Arc::new(by));
+    pane.steps();
+    assert!(pane.sees("By tip poses corrected for the errors of the arm"));
 }
 
 #[test]
