@@ -4,10 +4,11 @@ use handeye_geometry::targets::observation::View;
 use handeye_simulate::session::{ArmError, Setup, session};
 
 use super::*;
-use crate::diagnose::Calibration;
-use crate::diagnose::findings::{FindingCode, FindingOptions, findings};
+use crate::diagnose::findings::{FindingCode, FindingOptions, Severity, findings};
+use crate::diagnose::{Calibration, calibrate};
 use crate::handeye::Mode;
 use crate::handeye::joint::camera_from_target;
+use crate::stated_uncertainty::StatedUncertainty;
 use crate::test_sessions::OFF_LINKS;
 use crate::{Method, fit as calibrated};
 
@@ -95,4 +96,36 @@ fn views_that_do_not_know_their_joints_have_no_arm() {
     let session = session(&Setup::new(Mode::EyeInHand, 12, 7));
     let fit = calibrated(&session.observations(false), Method::Joint, &CancelToken::default()).expect("solves");
     assert!(fit.joint.expect("a joint estimate").arm.is_none());
+}
+
+/// What the examination says of views of an arm whose links are off by some millimetres, taken along rounds as a plan does, with the
+/// board slipped in the middle of the session.
+fn examined(mode: Mode, slip_m: f64) -> (Vec<FindingCode>, Calibration) {
+    let links = OFF_LINKS.map(|row| row.map(|value| 4.0 * value));
+    let mut setup = Setup { by_level: true, views: 30, ..with(mode, ArmError::Links(links), 7) };
+    if slip_m > 0.0 {
+        setup.fault.board_moved = Some((15, [slip_m, 0.0, 0.0, 0.0, 0.0, 0.0].into()));
+    }
+    let observations = session(&setup).observations(false);
+    let calibration = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("solves");
+    let warned = calibration.diagnosis().findings.iter().filter(|finding| finding.severity >= Severity::Warning);
+    (warned.map(|finding| finding.code).collect(), calibration)
+}
+
+#[test]
+fn what_the_errors_of_an_arm_explain_is_called_nothing_else_and_a_board_that_slipped_a_millimetre_is_found_beside_them()
+{
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (found, calibration) = examined(mode, 0.0);
+        assert_eq!(found, [], "{mode:?}");
+        let noise = calibration.joint.as_ref().expect("joint").noise;
+        let by_poses_m = noise.robot_m.hypot(noise.field_m);
+        assert!(by_poses_m > 10.0 * 2e-5, "{mode:?}: what the arm repeats to hides what is off: {noise:?}");
+        assert_eq!(*calibration.stated_uncertainty(), StatedUncertainty::AsModelled, "{mode:?}");
+        let (found, calibration) = examined(mode, 1e-3);
+        assert_eq!(found, [FindingCode::BoardMoved], "{mode:?}");
+        // What it moves is counted from the answer that goes with the errors of the arm.
+        let moved_m = calibration.moved_m().expect("it counts on no move");
+        assert!((1e-5..1e-3).contains(&moved_m), "{mode:?}: {moved_m}");
+    }
 }

@@ -140,6 +140,18 @@ impl CorrectedArm {
     /// # Errors
     /// [`CorrectError`] says why the arm does not get there.
     pub fn command(&self, wanted: &Pose<Base, Tip>, near: &[f64]) -> Result<Command, CorrectError> {
+        let joints_rad = self.joints_for(wanted, near, ARRIVED)?;
+        let error_95_m = self.error_95_m(&joints_rad)?;
+        Ok(Command { base_from_tip: self.arm.forward(&joints_rad)?, joints_rad, error_95_m })
+    }
+
+    /// The joint values of [`Self::command`], as near to where the tip shall be as `arrived` says, metres and radians.
+    pub(crate) fn joints_for(
+        &self,
+        wanted: &Pose<Base, Tip>,
+        near: &[f64],
+        arrived: f64,
+    ) -> Result<Vec<f64>, CorrectError> {
         let mut pose = *wanted;
         let mut joints_rad = near.to_vec();
         let mut distance_m = f64::INFINITY;
@@ -147,9 +159,8 @@ impl CorrectedArm {
             joints_rad = self.arm.inverse(&pose, &joints_rad)?;
             let actual = self.actual(&joints_rad)?;
             let (off_m, off_rad) = actual.distance_to(wanted);
-            if off_m.max(off_rad) < ARRIVED {
-                let error_95_m = self.error_95_m(&joints_rad)?;
-                return Ok(Command { base_from_tip: self.arm.forward(&joints_rad)?, joints_rad, error_95_m });
+            if off_m.max(off_rad) < arrived {
+                return Ok(joints_rad);
             }
             distance_m = off_m;
             // What the tip is off by there it is off by nearby.

@@ -89,8 +89,7 @@ fn the_weight_says_how_far_small_errors_move_a_touch() {
         // Half a millimetre here, some hundredths of a degree there.
         let step = DVector::from_fn(6 + arm, |k, _| 3e-4 * (1.3 * k as f64 + 1.0).sin());
         let expected_m = (step.transpose() * &weight * &step)[(0, 0)].sqrt();
-        let mut truth =
-            Possible { at_view: Isometry3::identity(), at_touch: Isometry3::identity(), ..reach.repeated[0].clone() };
+        let mut truth = Possible { unexplained: Unexplained::nothing(), ..reach.repeated[0].clone() };
         truth.errors.values_mut().iter_mut().zip(step.rows(6, arm).iter()).for_each(|(value, step)| *value += step);
         let mount = truth.hand_eye.mount_from_camera().perturbed(&step.fixed_rows::<6>(0).into_owned());
         truth.hand_eye = HandEye::new(mode, mount, truth.hand_eye.anchor_from_target());
@@ -99,9 +98,10 @@ fn the_weight_says_how_far_small_errors_move_a_touch() {
             reach.views[view].camera_from_target.isometry() * target[random.below(target.len())]
         });
         let way = &reach.corrected;
+        let planned: Vec<Plan> = planned.into_iter().step_by(APART).collect();
         let touches = reach.touches(way, &planned).expect("in reach");
         let pivots = way.pivots(&touches[0], &reach.turns, &reach.views, &reach.tool);
-        let tool = way.tool_by(&pivots, &truth.errors, &reach.tool).expect("a tool");
+        let tool = way.tool_by(&pivots, &truth, &reach.tool).expect("a tool");
         let squares: f64 =
             touches.iter().map(|touch| Way::miss(touch, &truth, &reach.tool, &tool).norm_squared()).sum();
         let moved_m = (squares / touches.len() as f64).sqrt();

@@ -47,6 +47,8 @@ pub(super) struct Judged {
     ln_alternatives: f64,
     /// Whether it stands beside the one that was taken in first: the robot's poses cannot tell the two apart.
     pub as_good: bool,
+    /// Whether the errors of the arm are in the model.
+    beside_arm: bool,
     /// Prediction of held-out views without and with it.
     pub held_out: Option<(HeldOut, HeldOut)>,
     /// Noise of the robot without and with it.
@@ -81,6 +83,8 @@ impl Judged {
         let held_out = match (&self.candidate, &self.held_out) {
             // Corners say it themselves, each of hundreds; views are left out, not modelled.
             (Candidate::Effect(Effect::Warp | Effect::Lens | Effect::Centre) | Candidate::Views(_), _) => true,
+            // Errors of the arm predict what a size or a zero does as well as these do; what is likelier is another question.
+            (Candidate::Effect(Effect::Scale | Effect::Joint(_)), _) if self.beside_arm => true,
             (Candidate::Effect(_), None) => false,
             (Candidate::Effect(_), Some((without, with))) => with.is_better_than(without, self.ln_alternatives),
         };
@@ -141,6 +145,7 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         matters: false,
         ln_alternatives,
         as_good: false,
+        beside_arm: model.arm().is_some(),
         held_out: None,
         robot: [level(0), level(1)],
         fit,
@@ -160,11 +165,14 @@ pub(super) fn confirm(model: &Model<'_>, before: &Fit, judged: &mut Judged) {
         let with = &judged.state;
         judged.held_out = predicted(model, with, before).zip(predicted(model, with, &judged.fit));
     }
-    if let Candidate::Effect(effect @ (Effect::Scale | Effect::BoardMoved(_) | Effect::CameraMoved(_))) =
-        judged.candidate
-    {
-        judged.significant = judged.significant && is_more_than_a_field(model, judged, effect);
-    }
+    let Candidate::Effect(effect) = judged.candidate else { return };
+    judged.significant &= match (effect, model.arm()) {
+        (Effect::Scale, Some(arm)) => arm.beside_another_size,
+        (Effect::Scale, None) | (Effect::Joint(_), Some(_)) | (Effect::BoardMoved(_) | Effect::CameraMoved(_), _) => {
+            judged.significant && is_more_than_a_field(model, judged, effect)
+        }
+        _ => true,
+    };
 }
 
 /// Whether an effect is significant beside errors of the arm in the axes of its base, too.

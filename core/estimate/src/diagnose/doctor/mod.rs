@@ -247,7 +247,8 @@ fn examine(
     if views < select::NEED {
         return Err(format!("views with the target and a robot pose: {views}, {} are needed", select::NEED));
     }
-    let selection = select::select(&sight, &start, work).ok_or_else(|| {
+    let arm = calibration.and_then(Fit::arm);
+    let selection = select::select(&sight, &start, arm, work).ok_or_else(|| {
         if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }
     })?;
     let size = calibration.and_then(|calibration| calibration.joint.as_ref()?.size.as_ref());
@@ -261,7 +262,9 @@ fn examine(
             h.applied = stated_uncertainty::is_applied(calibration, h);
         }
     }
-    let noise = calibration.and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
+    // By an arm that is known what its errors do not explain.
+    let of_poses = calibration.and_then(|calibration| calibration.joint.as_ref()).map(|joint| joint.noise);
+    let noise = arm.map(|arm| arm.noise).or(of_poses);
     if let Some((calibration, stated)) = calibration.zip(stated) {
         *stated = stated_uncertainty::stated_uncertainty(&selection, calibration);
     }

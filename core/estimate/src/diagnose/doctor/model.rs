@@ -3,10 +3,11 @@
 //! For view `i` let `e_i = log(C_i⁻¹ · chain_i)`, the target's pose by the chain against the one seen, both at a
 //! solution that is nearly right. To first order
 //!
-//! `r_i = e_i + A_i x + y + B_i f + Σ h_i θ_h`,  `r_i ~ N(0, Σ_i + robot_m² Q_i^t + robot_rad² Q_i^r)`
+//! `r_i = e_i + A_i x + y + B_i f + E_i a + Σ h_i θ_h`,  `r_i ~ N(0, Σ_i + robot_m² Q_i^t + robot_rad² Q_i^r)`
 //!
 //! with `x`, `y` the corrections of hand-eye and target, `f` those of lens and warp (with the information that the
-//! corners hold on them apart from the poses), `Σ_i` the covariance of the seen pose by corner noise, `Q_i = D_i D_iᵀ`
+//! corners hold on them apart from the poses), `a` the errors of the arm where its joints are known and else those of its field,
+//! random effects with a level for each kind, `Σ_i` the covariance of the seen pose by corner noise, `Q_i = D_i D_iᵀ`
 //! the robot's noise brought into the target's frame, and `h_i` the column of a hypothesis. The noise levels are found
 //! by Fisher scoring on the restricted likelihood, under every hypothesis again. A hypothesis with `q` numbers is judged
 //! by Wald's statistic `W = θᵀ Cov(θ)⁻¹ θ` against the F distribution.
@@ -21,16 +22,21 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::effect::Effect;
 use super::views::SessionViews;
+use crate::arm_fit::ArmFit;
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::joint::chain::Chain;
 use crate::handeye::joint::pose_dependent_error::{self, HALF, Places, SLOPES};
+use crate::handeye::joint::{ArmErrors, LEVELS_OF_ARMS};
 use crate::resolution;
+use handeye_geometry::frames::Pose;
 use handeye_geometry::se3;
 use handeye_geometry::statistics::pooled_freedom;
 
 /// Parts of the field, each with a level: errors of position and of orientation in the axes of the tip, and in those of the
 /// base.
-const PARTS: usize = 4;
+const FIELD_PARTS: usize = 4;
+/// All kinds of random effects: those of the field, then the errors of the arm.
+const PARTS: usize = FIELD_PARTS + LEVELS_OF_ARMS.len();
 /// Smallest noise levels of the robot, m and rad: nothing is judged by less.
 const LEAST: [f64; 2] = [resolution::PLACE_M, resolution::ANGLE_RAD];
 /// Smallest levels of the field, m and rad: below it nothing changes now.
@@ -53,6 +59,8 @@ pub(super) struct Row {
     pub error: Vector6<f64>,
     pub by_hand_eye: Matrix6<f64>,
     pub by_robot: Matrix6<f64>,
+    /// How the residual turns with the errors of the arm; no columns where they are not in the model.
+    by_arm: DMatrix<f64>,
     camera: Matrix6<f64>,
     robot: [Matrix6<f64>; 2],
 }
@@ -66,9 +74,26 @@ pub(super) struct Model<'a> {
     pub field: Option<Places>,
     /// Whether the field has a part in the axes of the base.
     in_base: bool,
+    /// The arm, where its joints are known.
+    arm: Option<KnownArm>,
     /// Work that was done with it and with models that were made of it, in elements of normal equations that a view was added to:
     /// what an examination costs, by a count that is the same on every machine.
     work: Rc<Cell<u64>>,
+}
+
+/// An arm whose joints are known.
+#[derive(Clone)]
+pub(super) struct KnownArm {
+    /// The errors at which the equations are linear.
+    pub errors: ArmErrors,
+    /// Whether the joint estimate, which weighs what arms and what sizes are likely, has another size of the target beside them.
+    pub beside_another_size: bool,
+}
+
+impl From<&ArmFit> for KnownArm {
+    fn from(fit: &ArmFit) -> Self {
+        Self { errors: fit.errors.clone(), beside_another_size: fit.beside.free.scale }
+    }
 }
 
 /// Variances of the robot per axis, of position (m²) and of orientation (rad²).
@@ -76,14 +101,16 @@ pub(super) struct Model<'a> {
 pub(super) struct Levels {
     /// Of its noise, view by view.
     pub noise: [f64; 2],
-    /// Of what depends on where it stands, at a typical place: in the axes of the tip, then in those of the base.
-    pub field: [f64; PARTS],
+    /// Of what depends on where it stands, at a typical place: in the axes of the tip, then in those of the base; and of the errors of
+    /// its arm, angles (rad²), lengths (m²) and compliance (rad²).
+    pub effects: [f64; PARTS],
 }
 
 impl Levels {
-    /// With as much of the one as of the other.
+    /// With as much of a field as of noise, and an arm like others.
     pub fn even(noise: [f64; 2]) -> Self {
-        Self { noise, field: [noise[0], noise[1], noise[0], noise[1]] }
+        let [angle, length, compliance] = LEVELS_OF_ARMS.map(|level| level * level);
+        Self { noise, effects: [noise[0], noise[1], noise[0], noise[1], angle, length, compliance] }
     }
 }
 
@@ -97,11 +124,11 @@ pub(super) struct State {
 
 /// The result of a fit.
 pub(super) struct Fit {
-    /// `[x (6), y (6), lens if free, slopes of the field if there is one, numbers of the effects…]`
+    /// `[x (6), y (6), lens if free, slopes of the field if there is one, errors of the arm if it is known, numbers of the effects…]`
     pub theta: DVector<f64>,
     pub covariance: DMatrix<f64>,
     pub levels: Levels,
-    /// Unknowns that the data determine: a slope of the field that follows its prior counts for less than one.
+    /// Unknowns that the data determine: a random effect that follows its prior counts for less than one.
     pub determined: f64,
     /// Residual of every view, those aside included.
     pub residuals: Vec<Vector6<f64>>,
@@ -110,35 +137,54 @@ pub(super) struct Fit {
     pub designs: Vec<DMatrix<f64>>,
     /// Views in the fit.
     pub views: usize,
-    /// Places of the field's slopes among the unknowns, in the order of their levels.
-    slopes: [Range<usize>; PARTS],
+    /// Places of the random effects among the unknowns, in the order of their levels.
+    random: [Range<usize>; PARTS],
 }
 
 impl<'a> Model<'a> {
-    pub fn new(sight: &'a SessionViews, solution: ClosedFormSolution, field: Option<Places>) -> Self {
+    /// With the errors of the arm, where they are known, at which its equations are linear.
+    pub fn new(
+        sight: &'a SessionViews,
+        solution: ClosedFormSolution,
+        field: Option<Places>,
+        arm: Option<KnownArm>,
+    ) -> Self {
         let rows = sight
             .views
             .iter()
             .map(|view| {
+                let tip = arm.as_ref().map(|arm| arm.errors.true_tip(&view.base_from_tip, &view.tip_from_joints));
+                let base_from_tip = tip.as_ref().map_or(view.base_from_tip, |tip| {
+                    Pose::from_isometry(view.base_from_tip.isometry() * tip.reported_from_true)
+                });
                 let chain = Chain::new(
                     sight.mode,
-                    &view.base_from_tip,
+                    &base_from_tip,
                     &Vector6::zeros(),
                     &solution.mount_from_camera,
                     &solution.anchor_from_target,
                 );
                 let seen = nearer(sight, view, &chain.camera_from_target);
                 let (t, r) = (chain.by_correction.fixed_columns::<3>(0), chain.by_correction.fixed_columns::<3>(3));
+                let mut error = se3::log(&(seen.inverse() * chain.camera_from_target));
+                let mut by_arm = DMatrix::zeros(6, 0);
+                if let Some((tip, arm)) = tip.zip(arm.as_ref()) {
+                    let columns = chain.by_correction * tip.by_errors;
+                    // The unknowns are the errors themselves, of mean zero.
+                    error -= &columns * DVector::from_column_slice(arm.errors.values());
+                    by_arm = DMatrix::from_iterator(6, columns.ncols(), columns.iter().copied());
+                }
                 Row {
-                    error: se3::log(&(seen.inverse() * chain.camera_from_target)),
+                    error,
                     by_hand_eye: chain.by_hand_eye,
                     by_robot: chain.by_correction,
+                    by_arm,
                     camera: view.covariance,
                     robot: [t * t.transpose(), r * r.transpose()],
                 }
             })
             .collect();
-        Self { sight, solution, rows, field, in_base: false, work: Rc::default() }
+        Self { sight, solution, rows, field, in_base: false, arm, work: Rc::default() }
     }
 
     /// The same with a field that has a part in the axes of the base, too; `None` where there is none to be had.
@@ -148,8 +194,8 @@ impl<'a> Model<'a> {
     /// size of the target, or like a move. An effect beside both parts is more than that.
     pub fn with_field_in_base(&self) -> Option<Self> {
         let field = Places::for_field(self.sight.views.iter().map(|view| &view.base_from_tip))?;
-        let (sight, solution, rows, work) = (self.sight, self.solution, self.rows.clone(), Rc::clone(&self.work));
-        Some(Self { sight, solution, rows, field: Some(field), in_base: true, work })
+        let (rows, arm, work) = (self.rows.clone(), self.arm.clone(), Rc::clone(&self.work));
+        Some(Self { sight: self.sight, solution: self.solution, rows, field: Some(field), in_base: true, arm, work })
     }
 
     /// The same views at the solution that a fit found.
@@ -159,7 +205,12 @@ impl<'a> Model<'a> {
             mount_from_camera: self.solution.mount_from_camera.perturbed(&step(0)),
             anchor_from_target: self.solution.anchor_from_target.perturbed(&step(6)),
         };
-        Self { work: Rc::clone(&self.work), ..Self::new(self.sight, solution, self.field) }
+        let of_arm = self.arm_at()..self.effects_at();
+        let arm = self.arm.as_ref().and_then(|arm| {
+            let values = fit.theta.rows(of_arm.start, of_arm.len()).iter().copied().collect();
+            Some(KnownArm { errors: ArmErrors::new(arm.errors.joint_count(), values)?, ..*arm })
+        });
+        Self { work: Rc::clone(&self.work), ..Self::new(self.sight, solution, self.field, arm) }
     }
 
     /// Takes account of normal equations of so many unknowns that every view was added to.
@@ -182,14 +233,29 @@ impl<'a> Model<'a> {
         12 + if self.sight.lens_free { self.sight.lens_count() } else { 0 }
     }
 
+    /// First column of the errors of the arm.
+    fn arm_at(&self) -> usize {
+        self.field_at() + self.slopes()
+    }
+
     /// First column of the effects.
     pub fn effects_at(&self) -> usize {
-        self.field_at() + self.slopes()
+        self.arm_at() + self.arm.as_ref().map_or(0, |arm| arm.errors.values().len())
+    }
+
+    /// The arm, where its joints are known.
+    pub fn arm(&self) -> Option<&KnownArm> {
+        self.arm.as_ref()
+    }
+
+    /// Number of random effects.
+    fn random(&self) -> usize {
+        self.effects_at() - self.field_at()
     }
 
     /// Whether a fit found that errors depend on where the robot stands: the data determine a part of the slopes.
     pub fn has_field(&self, fit: &Fit) -> bool {
-        fit.determined > (fit.width() - self.slopes()) as f64 + LEAST_DETERMINED
+        fit.determined > (fit.width() - self.random()) as f64 + LEAST_DETERMINED
     }
 
     fn slopes(&self) -> usize {
@@ -224,6 +290,8 @@ impl<'a> Model<'a> {
                 at += columns.ncols();
             }
         }
+        design.view_mut((0, at), row.by_arm.shape()).copy_from(&row.by_arm);
+        at += row.by_arm.ncols();
         for effect in &state.effects {
             let columns = effect.columns(self, index);
             design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
@@ -264,14 +332,14 @@ impl<'a> Model<'a> {
     pub fn fit(&self, state: &State, start: Levels) -> Option<Fit> {
         let width = self.width(state);
         let inside: Vec<usize> = (0..self.rows.len()).filter(|i| !state.aside.contains(i)).collect();
-        if 6 * inside.len() <= width - self.slopes() {
+        if 6 * inside.len() <= width - self.random() {
             return None;
         }
         let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
         let least: [f64; 2 + PARTS] = std::array::from_fn(|k| LEAST.get(k).copied().unwrap_or(LEAST_FIELD).powi(2));
         let mut levels = Levels {
             noise: std::array::from_fn(|k| start.noise[k].max(least[k])),
-            field: std::array::from_fn(|k| start.field[k].max(least[LEAST.len() + k])),
+            effects: std::array::from_fn(|k| start.effects[k].max(least[LEAST.len() + k])),
         };
         for step in 0..=MAX_STEPS {
             self.count_work(width);
@@ -280,10 +348,10 @@ impl<'a> Model<'a> {
                 return Some(self.finished(solved, levels, designs, &inside));
             }
             let of_noise = self.scoring(&inside, &designs, &solved, levels.noise);
-            let of_field = self.scoring_of_field(&solved, levels.field);
+            let of_effects = self.scoring_of_effects(&solved, levels.effects);
             let mut settled = true;
-            let changes = of_noise.into_iter().chain(of_field);
-            for ((v, least), c) in levels.noise.iter_mut().chain(&mut levels.field).zip(least).zip(changes) {
+            let changes = of_noise.into_iter().chain(of_effects);
+            for ((v, least), c) in levels.noise.iter_mut().chain(&mut levels.effects).zip(least).zip(changes) {
                 settled &= c.abs() < SETTLED || (c < 0.0 && *v <= least);
                 *v = (*v * c.exp()).max(least);
             }
@@ -311,7 +379,7 @@ impl<'a> Model<'a> {
             right.gemv_tr(-1.0, &weighted, &self.rows[i].error, 1.0);
         }
         self.add_form(state, &mut normal, &mut right);
-        for (part, level) in self.field_parts().into_iter().zip(levels.field) {
+        for (part, level) in self.parts().into_iter().zip(levels.effects) {
             part.for_each(|i| normal[(i, i)] += level.recip());
         }
         let covariance = inverse(&normal)?;
@@ -319,19 +387,26 @@ impl<'a> Model<'a> {
         theta.iter().all(|v| v.is_finite()).then_some(Solution { weights, covariance, theta })
     }
 
-    /// Places of the field's slopes among the unknowns, in the order of their levels.
-    fn field_parts(&self) -> [Range<usize>; PARTS] {
-        let (first, end) = (self.field_at(), self.effects_at());
-        [0, 1, 2, 3].map(|k| {
-            let at = |k: usize| (first + k * HALF).min(end);
-            at(k)..at(k + 1)
+    /// Places of the random effects among the unknowns, in the order of their levels.
+    fn parts(&self) -> [Range<usize>; PARTS] {
+        let (first, end) = (self.field_at(), self.arm_at());
+        let of_arm = self.arm.as_ref().map_or([0; PARTS - FIELD_PARTS], |arm| arm.errors.counts());
+        let mut at = end;
+        std::array::from_fn(|k| {
+            let Some(kind) = k.checked_sub(FIELD_PARTS) else {
+                let slope = |k: usize| (first + k * HALF).min(end);
+                return slope(k)..slope(k + 1);
+            };
+            let part = at..at + of_arm[kind];
+            at = part.end;
+            part
         })
     }
 
-    /// Logarithmic step of the variances of the field: Fisher scoring on the restricted likelihood, in which
+    /// Logarithmic step of the variances of the random effects: Fisher scoring on the restricted likelihood, in which
     /// `Zᵀ P Z = (1 - C / v) / v` for effects with the variance `v` and the covariance `C` after the fit.
-    fn scoring_of_field(&self, solved: &Solution, levels: [f64; PARTS]) -> [f64; PARTS] {
-        let parts = self.field_parts();
+    fn scoring_of_effects(&self, solved: &Solution, levels: [f64; PARTS]) -> [f64; PARTS] {
+        let parts = self.parts();
         let mut gradient = nalgebra::SVector::<f64, PARTS>::zeros();
         let mut information = nalgebra::SMatrix::<f64, PARTS, PARTS>::zeros();
         for (k, part) in parts.iter().enumerate() {
@@ -360,7 +435,7 @@ impl<'a> Model<'a> {
             information[(k, k)] *= 1.0 + 1e-3;
         }
         let step = information.try_inverse().map_or_else(|| gradient * 0.0, |inverse| inverse * gradient);
-        [0, 1, 2, 3].map(|k: usize| step[k].clamp(-LARGEST_STEP, LARGEST_STEP))
+        std::array::from_fn(|k| step[k].clamp(-LARGEST_STEP, LARGEST_STEP))
     }
 
     fn residual(&self, index: usize, design: &DMatrix<f64>, theta: &DVector<f64>) -> Vector6<f64> {
@@ -403,12 +478,12 @@ impl<'a> Model<'a> {
 
     fn finished(&self, solved: Solution, levels: Levels, designs: Vec<DMatrix<f64>>, inside: &[usize]) -> Fit {
         let Solution { weights, covariance, theta } = solved;
-        let parts = self.field_parts().into_iter().zip(levels.field);
+        let parts = self.parts().into_iter().zip(levels.effects);
         let by_prior: f64 = parts.map(|(part, level)| part.map(|i| covariance[(i, i)] / level).sum::<f64>()).sum();
         let determined = theta.len() as f64 - by_prior;
         let residuals = designs.iter().enumerate().map(|(i, design)| self.residual(i, design, &theta)).collect();
-        let (views, slopes) = (inside.len(), self.field_parts());
-        Fit { theta, covariance, levels, determined, residuals, weights, designs, views, slopes }
+        let (views, random) = (inside.len(), self.parts());
+        Fit { theta, covariance, levels, determined, residuals, weights, designs, views, random }
     }
 }
 
@@ -461,13 +536,13 @@ impl Fit {
         (0.5 * (6.0 * self.views as f64 - self.determined)).max(1.0)
     }
 
-    /// Degrees of freedom of the variance of some unknowns. What of it is due to the slopes of the field is in proportion to
-    /// their variance, which is estimated from the slopes alone that the data determine: nine in each part at the most,
+    /// Degrees of freedom of the variance of some unknowns. What of it is due to random effects is in proportion to
+    /// their variance, which is estimated from those alone that the data determine: nine slopes in each part of a field at the most,
     /// however many views there are. The rest is the noise's.
     pub fn freedom(&self, at: usize, count: usize) -> f64 {
         let covariance = self.covariance.view((at, at), (count, count)).into_owned();
-        let by_slopes = |part: &Range<usize>| self.covariance.view((at, part.start), (count, part.len())).into_owned();
-        self.pooled(&covariance, by_slopes)
+        let by_effects = |part: &Range<usize>| self.covariance.view((at, part.start), (count, part.len())).into_owned();
+        self.pooled(&covariance, by_effects)
     }
 
     /// The same of how far a view that is not in the fit is from what is expected of it.
@@ -475,23 +550,24 @@ impl Fit {
         let design = &self.designs[view];
         let own = self.weights[view].try_inverse()?;
         let shared = design * &self.covariance * design.transpose();
-        let by_slopes = |part: &Range<usize>| design * self.covariance.columns(part.start, part.len());
-        Some(self.pooled(&DMatrix::from_fn(6, 6, |i, j| own[(i, j)] + shared[(i, j)]), by_slopes))
+        let by_effects = |part: &Range<usize>| design * self.covariance.columns(part.start, part.len());
+        Some(self.pooled(&DMatrix::from_fn(6, 6, |i, j| own[(i, j)] + shared[(i, j)]), by_effects))
     }
 
-    /// By a covariance, and the covariance of its numbers with some of the slopes: by the log of the variance `v` of these
+    /// By a covariance, and the covariance of its numbers with some of the random effects: by the log of the variance `v` of these
     /// the covariance `C` changes by `C_s C_sᵀ / v`.
-    fn pooled(&self, covariance: &DMatrix<f64>, by_slopes: impl Fn(&Range<usize>) -> DMatrix<f64>) -> f64 {
+    fn pooled(&self, covariance: &DMatrix<f64>, by_effects: impl Fn(&Range<usize>) -> DMatrix<f64>) -> f64 {
         let Some(inverse) = inverse(covariance) else { return self.freedom_of_noise() };
-        let of_field = self.slopes.iter().zip(self.levels.field).map(|(part, level)| {
-            let with = by_slopes(part);
+        let random = self.random.iter().zip(self.levels.effects).filter(|(part, _)| !part.is_empty());
+        let of_effects = random.map(|(part, level)| {
+            let with = by_effects(part);
             let share = (&inverse * &with).dot(&with) / (level * covariance.nrows() as f64);
             let known = part.len() as f64 - part.clone().map(|i| self.covariance[(i, i)]).sum::<f64>() / level;
             (share, known)
         });
-        let of_field: Vec<(f64, f64)> = of_field.collect();
-        let of_noise = 1.0 - of_field.iter().map(|(share, _)| share).sum::<f64>();
-        pooled_freedom(of_field.into_iter().chain([(of_noise, self.freedom_of_noise())]))
+        let of_effects: Vec<(f64, f64)> = of_effects.collect();
+        let of_noise = 1.0 - of_effects.iter().map(|(share, _)| share).sum::<f64>();
+        pooled_freedom(of_effects.into_iter().chain([(of_noise, self.freedom_of_noise())]))
     }
 
     /// Wald's statistic of `count` unknowns from `at`.

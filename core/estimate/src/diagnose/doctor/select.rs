@@ -3,11 +3,12 @@
 
 use super::effect::Effect;
 use super::judge::{Judged, LEAST_SCALE, confirm, judge};
-use super::model::{Fit, Levels, Model, State};
+use super::model::{Fit, KnownArm, Levels, Model, State};
 use super::screen::{Candidate, screened};
 use super::views::SessionViews;
 use super::weight::Weight;
 use crate::TargetSize;
+use crate::arm_fit::ArmFit;
 use crate::diagnose::hypotheses::agreement::Agreement;
 use crate::handeye::joint::pose_dependent_error::Places;
 use handeye_geometry::progress::Work;
@@ -43,9 +44,19 @@ pub(super) struct Selection<'a> {
 }
 
 /// Judges all hypotheses. `None` when the views leave something open, or when it was cancelled.
-pub(super) fn select<'a>(sight: &'a SessionViews, start: &Agreement, work: &Work<'_>) -> Option<Selection<'a>> {
-    let places = Places::for_field(sight.views.iter().map(|view| &view.base_from_tip));
-    let mut model = Model::new(sight, start.solution, places);
+///
+/// `arm` are the errors of the arm by the joint estimate, where its joints are known: they are in every fit, and nothing that they
+/// explain is taken for anything else.
+pub(super) fn select<'a>(
+    sight: &'a SessionViews,
+    start: &Agreement,
+    arm: Option<&ArmFit>,
+    work: &Work<'_>,
+) -> Option<Selection<'a>> {
+    // Errors of an arm that is known say more than a field of what it does.
+    let places =
+        if arm.is_some() { None } else { Places::for_field(sight.views.iter().map(|view| &view.base_from_tip)) };
+    let mut model = Model::new(sight, start.solution, places, arm.map(KnownArm::from));
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
     let noise_m = start.median_m / 3.0;
@@ -177,7 +188,7 @@ mod tests {
             let cancel = CancelToken::default();
             let sight = SessionViews::new(&observations, None).expect("views");
             let start = gross::gross(&sight, &(&cancel).into()).expect("not cancelled").as_given.expect("a solution");
-            let selection = select(&sight, &start, &(&cancel).into()).expect("selected");
+            let selection = select(&sight, &start, None, &(&cancel).into()).expect("selected");
             assert!(selection.model.work() < 2 * MOST_WORK, "{views}: {}", selection.model.work());
             let diagnosis = diagnose(&observations, &FindingOptions::default(), &cancel);
             assert!(!diagnosis.is_healthy());

@@ -50,7 +50,9 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
     if !missed && others.is_empty() {
         return StatedUncertainty::AsModelled;
     }
-    let Some(answer) = &calibration.hand_eye else { return StatedUncertainty::Nothing };
+    // The linear model has the errors of an arm that is known: it moves the answer that goes with them.
+    let answer = calibration.arm().map(|arm| arm.hand_eye).or(calibration.hand_eye);
+    let Some(answer) = answer else { return StatedUncertainty::Nothing };
     let to = |fit: &Fit| alternative(&answer.mount_from_camera(), &model.solution.mount_from_camera, fit);
     let mut alternatives = Vec::new();
     let size = calibration.joint.as_ref().and_then(|joint| joint.size.as_ref());
@@ -102,7 +104,7 @@ fn counts_on(calibration: &estimate::Fit, effect: Effect) -> bool {
     };
     match effect {
         Effect::Warp => joint.free.warp,
-        Effect::Scale => joint.free.scale,
+        Effect::Scale => joint.free.scale || calibration.arm().is_some_and(|arm| arm.beside.free.scale),
         // Its stated error counts the zeros of the arm.
         Effect::Joint(_) => calibration.arm().is_some(),
         Effect::Lens | Effect::Centre | Effect::BoardMoved(_) | Effect::CameraMoved(_) => false,

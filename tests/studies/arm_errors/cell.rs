@@ -1,0 +1,229 @@
+//! A cell: where camera, target and tool are on and about an arm, the views that are taken in it, and the points that are touched.
+
+use handeye_arm::Arm;
+use handeye_estimate::handeye::Mode;
+use handeye_geometry::targets::observation::Corner;
+use handeye_geometry::targets::{Grid, TargetSpec};
+use handeye_simulate::lens;
+use handeye_simulate::links::{noise_twist, normal, shift_and_turn};
+use handeye_simulate::session::{Cone, camera};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6,
+};
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::chain::{Chain, Model, between, newton};
+use crate::real::Real;
+
+pub const TARGET: TargetSpec = TargetSpec::Chessboard(Grid { columns: 9, rows: 6, square_m: 0.025 });
+const CORNER_PX: f64 = 0.1;
+const TOOL_M: f64 = 0.12;
+/// Draws at the most until as many views or touches are within reach.
+pub const TRIES: usize = 2000;
+/// Turns about one point by which a tool is found.
+const TURNS: usize = 12;
+const CONE: Cone =
+    Cone { tilt_deg: 40.0, roll_deg: 150.0, distance_m: 0.3..0.5, beside_m: 0.04, distance_first: false };
+
+/// An arm, what its controller believes, and where things are on and about it.
+pub struct Cell {
+    pub real: Real,
+    pub believed: Chain,
+    pub arm: Arm,
+    pub mode: Mode,
+    start: Vec<f64>,
+    repeats: [f64; 2],
+    /// `tip_from_camera`, or `base_from_camera`.
+    pub camera: Isometry3<f64>,
+    /// `base_from_target`, or `tip_from_target`.
+    target: Isometry3<f64>,
+    pub tool: Isometry3<f64>,
+}
+
+pub struct Taken {
+    pub joints: Vec<f64>,
+    pub corners: Vec<Corner>,
+    /// Where the camera saw the target from, as it was.
+    tip: Isometry3<f64>,
+}
+
+impl Cell {
+    pub fn new(name: &str, model: Model, real: Real, repeats: [f64; 2], mode: Mode) -> Self {
+        let Model { believed, start, arm, .. } = model;
+        let turned_over = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
+        let centred = Translation3::from(-TARGET.centre().coords);
+        // Before the camera: a target's z axis points away from who looks at it.
+        let before = Isometry3::translation(0.0, 0.0, 0.4) * centred;
+        let tip = believed.forward(&start);
+        let universal = name.starts_with("ur");
+        let reach = -(believed.links[2].place.x + believed.links[3].place.x);
+        let (camera, target) = match mode {
+            Mode::EyeInHand => {
+                let camera = Isometry3::from_parts(
+                    Translation3::new(0.03, -0.06, 0.05),
+                    UnitQuaternion::from_scaled_axis(Vector3::new(0.05, -0.08, 0.4)),
+                );
+                // At its start an arm of Universal Robots stretches along −x.
+                let on_table = Translation3::new(-0.6 * reach, -0.15 * reach, 0.05);
+                let table = Isometry3::from_parts(on_table, turned_over) * centred;
+                (camera, if universal { table } else { tip * camera * before })
+            }
+            Mode::EyeToHand => {
+                let target = Isometry3::from_parts(Translation3::new(0.01, 0.02, 0.06), turned_over) * centred;
+                let beside = Translation3::new(-0.65 * reach, -0.1 * reach, -0.1);
+                let below = Isometry3::from_parts(beside, UnitQuaternion::identity());
+                (if universal { below } else { tip * target * before.inverse() }, target)
+            }
+        };
+        let tool = Isometry3::translation(0.0, 0.0, TOOL_M);
+        Self { real, believed, arm, mode, start, repeats, camera, target, tool }
+    }
+
+    /// Joint values that put the tip at a pose as the controller believes, within the ranges of the arm.
+    pub fn believed_joints(&self, goal: &Isometry3<f64>, near: &[f64]) -> Option<Vec<f64>> {
+        let joints = newton(|q| self.believed.forward(q), near, |tip| between(tip, goal))?;
+        self.arm.joints().iter().zip(&joints).all(|(joint, value)| joint.range.contains(*value)).then_some(joints)
+    }
+
+    /// Where the tip is when it is sent to joint values: it does not come back to the same place.
+    pub fn sent(&self, joints: &[f64], rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+        let [metres, radians] = self.repeats;
+        self.real.tip(joints) * shift_and_turn(&noise_twist(rng, metres, radians))
+    }
+
+    pub fn camera_from_target(&self, tip: &Isometry3<f64>) -> Isometry3<f64> {
+        match self.mode {
+            Mode::EyeInHand => (tip * self.camera).inverse() * self.target,
+            Mode::EyeToHand => self.camera.inverse() * tip * self.target,
+        }
+    }
+
+    /// Where a camera is that is mounted so, with the tip there.
+    pub fn camera_at(&self, tip: &Isometry3<f64>, mounted: &Isometry3<f64>) -> Isometry3<f64> {
+        match self.mode {
+            Mode::EyeInHand => tip * mounted,
+            Mode::EyeToHand => *mounted,
+        }
+    }
+
+    fn tip_for(&self, camera_from_target: &Isometry3<f64>) -> Isometry3<f64> {
+        match self.mode {
+            Mode::EyeInHand => self.target * camera_from_target.inverse() * self.camera.inverse(),
+            Mode::EyeToHand => self.camera * camera_from_target * self.target.inverse(),
+        }
+    }
+
+    /// So many views; fewer where the arm does not reach them.
+    pub fn take(&self, views: usize, rng: &mut ChaCha8Rng) -> Vec<Taken> {
+        let mut taken = Vec::new();
+        for _ in 0..TRIES {
+            if taken.len() < views {
+                taken.extend(self.view(rng));
+            }
+        }
+        taken
+    }
+
+    fn view(&self, rng: &mut ChaCha8Rng) -> Option<Taken> {
+        let wanted = self.tip_for(&CONE.draw(&TARGET, rng));
+        let near = self.near_start(rng);
+        self.view_at(self.believed_joints(&wanted, &near)?, rng)
+    }
+
+    /// What is seen with the joints there; nothing where the board is not wholly in the image.
+    pub fn view_at(&self, joints: Vec<f64>, rng: &mut ChaCha8Rng) -> Option<Taken> {
+        let tip = self.sent(&joints, rng);
+        let pose = self.camera_from_target(&tip);
+        let lens = camera();
+        let points = TARGET.points();
+        let corners = points.iter().enumerate().map(|(i, point)| {
+            let px = lens::pixel(&lens, &(pose * point))?;
+            let noise = Vector2::new(normal(rng), normal(rng)) * CORNER_PX;
+            lens::is_in_image(&lens, &px).then(|| Corner::new(i, px + noise))
+        });
+        Some(Taken { joints, corners: corners.collect::<Option<_>>()?, tip })
+    }
+
+    /// Where an arm before its work stands, a little off: some start finds every pose.
+    fn near_start(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        let mut joints: Vec<f64> = self.start.iter().map(|angle| angle + 0.3 * normal(rng)).collect();
+        if let Some(last) = joints.last_mut() {
+            *last = rng.random_range(-std::f64::consts::PI..std::f64::consts::PI);
+        }
+        joints
+    }
+
+    /// The tip of the tool in the frame of the tip, by an arm that turned about one point: `believed` says where it takes its tip to be.
+    pub fn tool_by(&self, believed: impl Fn(&[f64]) -> Isometry3<f64>, rng: &mut ChaCha8Rng) -> Option<Vector3<f64>> {
+        let middle = self.tip_for(&CONE.draw(&TARGET, rng));
+        let point = middle * self.tool;
+        let (mut normal_matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
+        let mut count = 0;
+        for _ in 0..TRIES {
+            if count == TURNS {
+                break;
+            }
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| rng.random_range(-0.5..0.5)));
+            let goal = Isometry3::from_parts(point.translation, middle.rotation * turn) * self.tool.inverse();
+            let Some(joints) = self.believed_joints(&goal, &self.near_start(rng)) else { continue };
+            // The person sees the point and corrects: the tip of the tool is there, whatever the controller believes.
+            let wanted = point.translation.vector;
+            // The joints are reported as they are not quite.
+            let [metres, radians] = self.repeats;
+            let unreported = shift_and_turn(&noise_twist(rng, metres, radians));
+            let jogged = newton(
+                |q| self.real.tip(q) * unreported,
+                &joints,
+                |tip| {
+                    let off = (tip * self.tool).translation.vector - wanted;
+                    let turn = (tip.rotation.inverse() * goal.rotation).scaled_axis();
+                    let off = tip.rotation.inverse() * -off;
+                    Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z)
+                },
+            );
+            let Some(joints) = jogged else { continue };
+            let tip = believed(&joints);
+            let mut row = Matrix3x6::zeros();
+            row.fixed_columns_mut::<3>(0).copy_from(tip.rotation.to_rotation_matrix().matrix());
+            row.fixed_columns_mut::<3>(3).copy_from(&-Matrix3::identity());
+            normal_matrix += row.transpose() * row;
+            right += row.transpose() * -tip.translation.vector;
+            count += 1;
+        }
+        if count < TURNS {
+            return None;
+        }
+        Some((normal_matrix.try_inverse()? * right).fixed_rows::<3>(0).into_owned())
+    }
+
+    /// A point that the camera saw: in its frame, and in the base.
+    pub fn point(&self, view: &Taken, rng: &mut ChaCha8Rng) -> (Point3<f64>, Point3<f64>) {
+        let corner: Point3<f64> = TARGET.points()[rng.random_range(0..TARGET.points().len())];
+        let in_camera: Point3<f64> = self.camera_from_target(&view.tip) * corner;
+        (in_camera, self.camera_at(&view.tip, &self.camera) * in_camera)
+    }
+
+    /// How the tool is turned when it touches: against the board's normal, or along the mean axis that the tip had in the views; tilted by
+    /// up to 15°, with any turn about itself.
+    pub fn down(&self, taken: &[Taken], rng: &mut ChaCha8Rng) -> UnitQuaternion<f64> {
+        let axis = match self.mode {
+            Mode::EyeInHand => self.target.rotation * Vector3::z(),
+            Mode::EyeToHand => {
+                taken.iter().map(|view| self.believed.forward(&view.joints).rotation * Vector3::z()).sum()
+            }
+        };
+        let along = UnitQuaternion::rotation_between(&Vector3::z(), &axis)
+            .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
+        let tilt = 15.0_f64.to_radians() * rng.random::<f64>().sqrt();
+        let azimuth = rng.random_range(-3.1..3.1_f64);
+        let tilt = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt;
+        let turn = Vector3::z() * rng.random_range(-3.1..3.1);
+        along * UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(turn)
+    }
+
+    /// Distance from a point in the base to the tip of the tool of an arm that is sent to joint values.
+    pub fn off(&self, joints: &[f64], point: &Point3<f64>, rng: &mut ChaCha8Rng) -> f64 {
+        ((self.sent(joints, rng) * self.tool).translation.vector - point.coords).norm()
+    }
+}

@@ -1,0 +1,294 @@
+//! One session: views are taken and calibrated with, and points are touched.
+
+use handeye_arm::Arm;
+use handeye_estimate::corrected_arm::CorrectedArm;
+use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::diagnose::{Calibration, calibrate_with};
+use handeye_estimate::handeye::HandEye;
+use handeye_estimate::handeye::joint::{ArmErrors, LEVELS_OF_ARMS, LinkError, arm_parameters};
+use handeye_estimate::placement::{ArmOfViews, JointView, Placement, place_checked};
+use handeye_estimate::{ArmFit, CameraKnowledge, Method, Observations, ObservedView, Options};
+use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::progress::CancelToken;
+use handeye_simulate::links::shift_and_turn;
+use handeye_simulate::session::camera;
+use nalgebra::{DMatrix, DVector, Isometry3, Translation3, Vector6};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::Failure;
+use crate::cell::{Cell, TARGET, TRIES, Taken};
+
+const TOUCHES: usize = 40;
+
+/// Distances of touches by an arm as it is, by one whose command is corrected, and by the best of what Park and Martin find from the
+/// same views, RMS, millimetres; and which part of the first two is within the 95 % that are stated of them.
+pub struct Touched {
+    pub as_it_is_mm: f64,
+    pub corrected_mm: f64,
+    pub park_mm: f64,
+    pub within: [f64; 2],
+    pub stated_mm: [f64; 2],
+    /// Error of a point where the board was seen by the transform alone, and what is stated of it; not a number where the errors of
+    /// the arm are not those of a chain, and no one transform is the true one.
+    pub space_mm: f64,
+    pub space_stated_mm: f64,
+}
+
+/// How the views of a session come about, and what is known of it.
+#[derive(Clone, Copy)]
+pub struct Asked {
+    pub views: usize,
+    pub free_lens: bool,
+    /// Chosen by guided capture, not at random.
+    pub guided: bool,
+    /// Whether the chain is all that is wrong with the arm.
+    pub of_links: bool,
+}
+
+pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure> {
+    let Asked { views, free_lens, guided, of_links } = asked;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let placed = Placed::of(cell)?;
+    let taken = if guided {
+        crate::guided::guided(cell, &placed, views, free_lens, &mut rng)
+    } else {
+        cell.take(views, &mut rng)
+    };
+    if taken.len() < if guided { 10 } else { views } {
+        return Err(format!("the arm does not reach enough views: {}", taken.len()).into());
+    }
+    let (observations, of_views) = observed(cell, &placed, &taken, free_lens);
+    let calibrate = |method| {
+        let wanted = FindingOptions::default().with_arm(Some(&of_views));
+        calibrate_with(&observations, method, Options::default(), &wanted, &CancelToken::default())
+    };
+    let calibration = calibrate(Method::Joint)?;
+    let arm = calibration.joint.as_ref().and_then(|joint| joint.arm.as_ref()).ok_or("no arm was estimated")?;
+    if std::env::var_os("VERBOSE").is_some() {
+        report(&calibration, arm);
+    }
+    let hand_eye = calibration.hand_eye.ok_or("no answer")?;
+    // Random numbers of its own: what is touched does not depend on it.
+    let true_camera = if of_links {
+        true_mount_from_camera(cell, &of_views.placement.arm, &mut ChaCha8Rng::seed_from_u64(1))
+    } else {
+        None
+    };
+    let board = calibration.joint.as_ref().ok_or("no joint estimate")?.reference_point;
+    let space_m =
+        true_camera.map_or(f64::NAN, |truth| (hand_eye.mount_from_camera().isometry() * board - truth * board).norm());
+    let corrected = CorrectedArm::new(of_views.placement.arm.clone(), arm).ok_or("another arm")?;
+    let actual =
+        |joints: &[f64]| corrected.actual(joints).map_or_else(|_| Isometry3::identity(), |pose| *pose.isometry());
+    let believed = |joints: &[f64]| cell.believed.forward(joints);
+    let plain_tool = cell.tool_by(believed, &mut rng).ok_or("no tool")?;
+    let corrected_tool = cell.tool_by(actual, &mut rng).ok_or("no tool")?;
+    let park = calibrate(Method::ClosedForm("park_martin"))?.hand_eye.ok_or("no closed form")?;
+    let stated = calibration
+        .reach_errors()
+        .and_then(|reach| Some([reach.as_it_is_95_m, reach.corrected_95_m?]))
+        .unwrap_or([f64::NAN; 2]);
+    let mount = |of: &HandEye| *of.mount_from_camera().isometry();
+    let mut within = [0.0; 2];
+    let (mut squared, mut count) = ([0.0; 3], 0.0);
+    for _ in 0..TRIES {
+        if count == TOUCHES as f64 {
+            break;
+        }
+        let view = &taken[rng.random_range(0..taken.len())];
+        let (in_camera, truth) = cell.point(view, &mut rng);
+        let down = cell.down(&taken, &mut rng);
+        // By the controller as it is.
+        let by_controller = |hand_eye: &HandEye| {
+            let seen = cell.camera_at(&believed(&view.joints), &mount(hand_eye)) * in_camera;
+            let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-plain_tool);
+            cell.believed_joints(&goal, &view.joints)
+        };
+        let (Some(plain), Some(by_park)) = (by_controller(&hand_eye), by_controller(&park)) else { continue };
+        // By corrected poses and commands.
+        let seen = cell.camera_at(&actual(&view.joints), &mount(&arm.hand_eye)) * in_camera;
+        let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-corrected_tool);
+        let Ok(command) = corrected.command(&Pose::from_isometry(goal), &plain) else { continue };
+        let off = [plain, command.joints_rad, by_park].map(|joints| cell.off(&joints, &truth, &mut rng));
+        squared = std::array::from_fn(|k| squared[k] + off[k] * off[k]);
+        within = std::array::from_fn(|k| within[k] + f64::from(off[k] <= stated[k]));
+        count += 1.0;
+    }
+    if count < 1.0 {
+        return Err("the arm reaches none of the points".into());
+    }
+    let [as_it_is_mm, corrected_mm, park_mm] = squared.map(|sum| f64::sqrt(sum / count) * 1e3);
+    Ok(Touched {
+        as_it_is_mm,
+        corrected_mm,
+        park_mm,
+        within: within.map(|within| within / count),
+        stated_mm: stated.map(|m| m * 1e3),
+        space_mm: space_m * 1e3,
+        space_stated_mm: calibration.tip_error_95_m().map_or(f64::NAN, |m| m * 1e3),
+    })
+}
+
+/// What a transform is off by where the chain is not known: from that of so many views that it is the one that goes with the poses
+/// which this arm reports, and from the true one, millimetres at the board; and what is stated.
+pub struct Unknown {
+    pub from_reported_mm: f64,
+    pub from_truth_mm: f64,
+    pub stated_mm: f64,
+}
+
+const VERY_MANY: usize = 300;
+
+pub fn unknown(cell: &Cell, asked: Asked, seed: u64) -> Result<Unknown, Failure> {
+    let Asked { views, free_lens, of_links, .. } = asked;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let placed = Placed::of(cell)?;
+    let calibrate = |taken: &[Taken], free_lens| -> Result<Calibration, Failure> {
+        let (mut observations, _) = observed(cell, &placed, taken, free_lens);
+        observations.views.iter_mut().for_each(|view| view.tip_from_joints.clear());
+        let wanted = FindingOptions::default();
+        Ok(calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &CancelToken::default())?)
+    };
+    let taken = cell.take(views, &mut rng);
+    let calibration = calibrate(&taken, free_lens)?;
+    let board = calibration.joint.as_ref().ok_or("no joint estimate")?.reference_point;
+    let found = calibration.hand_eye.ok_or("no answer")?;
+    let many = calibrate(&cell.take(VERY_MANY, &mut rng), false)?.hand_eye.ok_or("no answer")?;
+    let at = |of: &HandEye| of.mount_from_camera().isometry() * board;
+    let truth =
+        if of_links { true_mount_from_camera(cell, &placed.arm, &mut ChaCha8Rng::seed_from_u64(1)) } else { None };
+    Ok(Unknown {
+        from_reported_mm: (at(&found) - at(&many)).norm() * 1e3,
+        from_truth_mm: truth.map_or(f64::NAN, |truth| (at(&found) - truth * board).norm() * 1e3),
+        stated_mm: calibration.tip_error_95_m().map_or(f64::NAN, |m| m * 1e3),
+    })
+}
+
+/// The arm that the program knows, where it stands.
+pub struct Placed {
+    pub arm: Arm,
+}
+
+impl Placed {
+    pub fn of(cell: &Cell) -> Result<Self, Failure> {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let joints: Vec<Vec<f64>> =
+            (0..10).map(|_| cell.arm.joints().iter().map(|_| rng.random_range(-1.5..1.5)).collect()).collect();
+        let views: Vec<JointView<'_>> = joints
+            .iter()
+            .map(|joints| JointView { base_from_tip: reported(cell, joints), joints_rad: joints })
+            .collect();
+        Ok(Self { arm: place_checked(&cell.arm, &views)?.0.arm })
+    }
+}
+
+fn reported(cell: &Cell, joints: &[f64]) -> Pose<Base, Tip> {
+    Pose::from_isometry(cell.believed.forward(joints))
+}
+
+/// What the estimator is given: corners, reported poses, joint values, and the arm that the program knows.
+pub fn observed(cell: &Cell, placed: &Placed, taken: &[Taken], free_lens: bool) -> (Observations, ArmOfViews) {
+    let view = |(i, taken): (usize, &Taken)| {
+        let pose = reported(cell, &taken.joints);
+        let tip_from_joints = placed.arm.tip_from_joints(&pose, &taken.joints).unwrap_or_default();
+        ObservedView {
+            tip_from_joints,
+            ..ObservedView::new(format!("{i}"), Some(pose), Some(taken.corners.clone().into()))
+        }
+    };
+    let observations = Observations {
+        mode: Some(cell.mode),
+        target: TARGET,
+        image_size: (camera().width, camera().height),
+        camera: if free_lens { CameraKnowledge::NOTHING } else { CameraKnowledge::Fixed(camera()) },
+        views: taken.iter().enumerate().map(view).collect(),
+    };
+    let of_views = ArmOfViews {
+        placement: Placement { arm: placed.arm.clone(), misses: vec![(0.0, 0.0); taken.len()] },
+        tool_m: cell.tool.translation.vector.into(),
+        joints_rad: taken.iter().map(|taken| Some(taken.joints.clone())).collect(),
+    };
+    (observations, of_views)
+}
+
+/// Where the transform of a perfect calibration is: that of the cell, but for what belongs to the gauge. With `A` the arm as it is and
+/// `F` as it is believed, `A(q) = Z F_e(q) T` with errors `e` of the joints between; `T` goes with the tip, and `Z` with the base.
+fn true_mount_from_camera(cell: &Cell, arm: &Arm, rng: &mut ChaCha8Rng) -> Option<Isometry3<f64>> {
+    const CONFIGURATIONS: usize = 40;
+    let rigid = |x: &[f64]| shift_and_turn(&Vector6::from_column_slice(x));
+    let joint_count = arm.joints().len();
+    let configurations: Vec<Vec<f64>> =
+        (0..CONFIGURATIONS).map(|_| (0..joint_count).map(|_| rng.random_range(-3.0..3.0)).collect()).collect();
+    let count = ArmErrors::none(joint_count).values().len();
+    let off = |x: &[f64]| -> Option<DVector<f64>> {
+        let errors = ArmErrors::new(joint_count, x[12..].to_vec())?;
+        let mut off = Vec::with_capacity(6 * CONFIGURATIONS);
+        for joints in &configurations {
+            let pose = arm.forward(joints).ok()?;
+            let tip =
+                pose.isometry() * errors.true_tip(&pose, &arm.tip_from_joints(&pose, joints).ok()?).reported_from_true;
+            let miss = cell.real.tip(joints).inverse() * rigid(&x[..6]) * tip * rigid(&x[6..12]);
+            off.extend(miss.translation.vector.iter().chain(miss.rotation.scaled_axis().iter()));
+        }
+        Some(DVector::from_vec(off))
+    };
+    // A turn of the base can be told as errors of all joints behind the first: it is what is likeliest for an arm.
+    let likely = |k: usize| match k.checked_sub(12).map(|k| arm_parameters(joint_count)[k].error) {
+        None => 0.0,
+        Some(LinkError::ShiftX | LinkError::ShiftY) => 1e-9 / LEVELS_OF_ARMS[1].powi(2) * LEVELS_OF_ARMS[0].powi(2),
+        Some(_) => 1e-9,
+    };
+    let likely = DVector::from_fn(12 + count, |k, _| likely(k));
+    let mut x = vec![0.0; 12 + count];
+    for _ in 0..8 {
+        let here = off(&x)?;
+        let columns = (0..x.len()).map(|k| {
+            let mut moved = x.clone();
+            moved[k] += 1e-6;
+            Some((off(&moved)? - &here) / 1e-6)
+        });
+        let by = DMatrix::from_columns(&columns.collect::<Option<Vec<_>>>()?);
+        let normal = by.transpose() * &by + DMatrix::from_diagonal(&likely);
+        let step = normal.lu().solve(&(by.transpose() * here + likely.component_mul(&DVector::from_vec(x.clone()))))?;
+        x.iter_mut().zip(step.iter()).for_each(|(x, step)| *x -= step);
+    }
+    if off(&x)?.amax() > 1e-5 {
+        return None;
+    }
+    let (base, tip) = (rigid(&x[..6]), rigid(&x[6..12]));
+    Some(match cell.mode {
+        handeye_estimate::handeye::Mode::EyeInHand => tip * cell.camera,
+        handeye_estimate::handeye::Mode::EyeToHand => base.inverse() * cell.camera,
+    })
+}
+
+fn report(calibration: &Calibration, arm: &ArmFit) {
+    let noise = arm.noise;
+    for finding in &calibration.diagnosis().findings {
+        println!("  {:?} {:?}: {:?}", finding.severity, finding.code, finding.evidence);
+    }
+    println!(
+        "{:?} moved {:?} robot {:.4} mm {:.4}° → {:.4} mm {:.4}°; levels {:.4}° {:.4} mm {:.4}°; held out {:?}; contradicted {}",
+        cell_of(calibration),
+        moved_mm(calibration),
+        calibration.joint.as_ref().map_or(0.0, |joint| joint.noise.robot_m * 1e3),
+        calibration.joint.as_ref().map_or(0.0, |joint| joint.noise.robot_rad.to_degrees()),
+        noise.robot_m * 1e3,
+        noise.robot_rad.to_degrees(),
+        noise.link_rad.to_degrees(),
+        noise.link_m * 1e3,
+        noise.compliance_rad.to_degrees(),
+        arm.heldout_px,
+        arm.contradicted
+    );
+}
+
+fn cell_of(calibration: &Calibration) -> Option<f64> {
+    calibration.reach_errors().and_then(|reach| reach.corrected_95_m)
+}
+
+fn moved_mm(calibration: &Calibration) -> Option<f64> {
+    let joint = calibration.joint.as_ref()?;
+    Some(calibration.stated_uncertainty().moved_m(&joint.reference_point) * 1e3)
+}
