@@ -9,6 +9,7 @@ use crate::handeye::joint::{
 };
 use crate::handeye::{HandEye, HandEyeError, determined};
 use crate::resolution;
+use crate::size::LEAST_SCALE;
 use crate::stated_uncertainty::Alternative;
 use crate::uncertainty::quality;
 use handeye_geometry::camera::Intrinsics;
@@ -119,7 +120,8 @@ impl ArmFit {
 }
 
 /// The same with the size of the target free, where the views ask for it: a target that is some thousandths larger than stated makes
-/// an arm look as much longer, by more than its own errors.
+/// an arm look as much longer, by more than its own errors. Of real arms some are longer in all links by a thousandth or two, which no
+/// view tells from such a target: less than a print may be off is the arm's.
 fn with_shown_size<'a>(
     stated: &JointProblem<'a>,
     fit: JointSolution,
@@ -130,7 +132,8 @@ fn with_shown_size<'a>(
     let by_size = by_size.filter(|by_size| {
         // The prior of the size is among the equations, but for its height.
         let both = by_size.deviance.zip(fit.deviance);
-        both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN)
+        let is_likelier = both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN);
+        is_likelier && (by_size.shape.scale - 1.0).abs() >= LEAST_SCALE
     });
     Ok(by_size.map_or((*stated, fit), |by_size| (sized, by_size)))
 }

@@ -18,6 +18,10 @@ use handeye_geometry::se3;
 /// picked. One in ten thousand, because noise of real robots has longer tails than a Gaussian.
 pub(crate) const FALSE_ALARM: f64 = 1e-4;
 
+/// Relative size below which another size, however certain, is left alone: a print is true to a few parts in a thousand, and the lengths
+/// of an arm are off alike by as much.
+pub(crate) const LEAST_SCALE: f64 = 3e-3;
+
 impl TargetSize {
     /// The same with all variances so many times as large, because the data show that they are.
     #[must_use]

@@ -155,8 +155,15 @@ impl Cell {
     }
 
     /// The tip of the tool in the frame of the tip, by an arm that turned about one point: `believed` says where it takes its tip to be.
-    pub fn tool_by(&self, believed: impl Fn(&[f64]) -> Isometry3<f64>, rng: &mut ChaCha8Rng) -> Option<Vector3<f64>> {
-        let middle = self.tip_for(&CONE.draw(&TARGET, rng));
+    /// The poses are turns from that of a view, and reached from there, as a person does.
+    pub fn tool_by(
+        &self,
+        believed: impl Fn(&[f64]) -> Isometry3<f64>,
+        taken: &[Taken],
+        rng: &mut ChaCha8Rng,
+    ) -> Option<Vector3<f64>> {
+        let near = &taken[rng.random_range(0..taken.len())].joints;
+        let middle = self.believed.forward(near);
         let point = middle * self.tool;
         let (mut normal_matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
         let mut count = 0;
@@ -166,7 +173,7 @@ impl Cell {
             }
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| rng.random_range(-0.5..0.5)));
             let goal = Isometry3::from_parts(point.translation, middle.rotation * turn) * self.tool.inverse();
-            let Some(joints) = self.believed_joints(&goal, &self.near_start(rng)) else { continue };
+            let Some(joints) = self.believed_joints(&goal, near) else { continue };
             // The person sees the point and corrects: the tip of the tool is there, whatever the controller believes.
             let wanted = point.translation.vector;
             // The joints are reported as they are not quite.

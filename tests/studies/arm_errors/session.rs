@@ -82,8 +82,8 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
     let actual =
         |joints: &[f64]| corrected.actual(joints).map_or_else(|_| Isometry3::identity(), |pose| *pose.isometry());
     let believed = |joints: &[f64]| cell.believed.forward(joints);
-    let plain_tool = cell.tool_by(believed, &mut rng).ok_or("no tool")?;
-    let corrected_tool = cell.tool_by(actual, &mut rng).ok_or("no tool")?;
+    let plain_tool = cell.tool_by(believed, &taken, &mut rng).ok_or("no tool")?;
+    let corrected_tool = cell.tool_by(actual, &taken, &mut rng).ok_or("no tool")?;
     let park = calibrate(Method::ClosedForm("park_martin"))?.hand_eye.ok_or("no closed form")?;
     let stated = calibration
         .reach_errors()
@@ -269,7 +269,7 @@ fn report(calibration: &Calibration, arm: &ArmFit) {
         println!("  {:?} {:?}: {:?}", finding.severity, finding.code, finding.evidence);
     }
     println!(
-        "{:?} moved {:?} robot {:.4} mm {:.4}° → {:.4} mm {:.4}°; levels {:.4}° {:.4} mm {:.4}°; held out {:?}; contradicted {}",
+        "{:?} moved {:?} robot {:.4} mm {:.4}° → {:.4} mm {:.4}°; levels {:.4}° {:.4} mm {:.4}°; held out {:?}; contradicted {}, size {:?}",
         cell_of(calibration),
         moved_mm(calibration),
         calibration.joint.as_ref().map_or(0.0, |joint| joint.noise.robot_m * 1e3),
@@ -280,7 +280,8 @@ fn report(calibration: &Calibration, arm: &ArmFit) {
         noise.link_m * 1e3,
         noise.compliance_rad.to_degrees(),
         arm.heldout_px,
-        arm.contradicted
+        arm.contradicted,
+        arm.shape().and_then(|shape| Some((shape.shape.scale, shape.scale_sigma?)))
     );
 }
 

@@ -103,7 +103,11 @@ fn images_and_joint_values_find_what_the_factory_measured() {
         let actual: Vec<_> =
             recorded.iter().map(|view| corrected.actual(&view.joints_rad).expect("six joints")).collect();
         let (mm, deg) = apart(&actual, &recorded);
-        println!("without the quarter {left_out:?}: {mm:.3} mm, {deg:.3}°, held out {:?} px", fit.heldout_px);
+        println!(
+            "without the quarter {left_out:?}: {mm:.3} mm, {deg:.3}°, held out {:?} px, size {:?}",
+            fit.heldout_px,
+            fit.shape()
+        );
         assert!(mm < believed.0 && deg < believed.1, "{left_out:?}: {mm} mm, {deg}°");
         assert!(!fit.contradicted, "{left_out:?}");
         if left_out.is_none() {

@@ -7,7 +7,7 @@ use super::effect::Effect;
 use super::model::{Fit, Model, State, inverse};
 use super::screen::{Candidate, view_score};
 use super::weight::{Weight, alternatives, is_significant};
-use crate::size::FALSE_ALARM as ALPHA;
+use crate::size::{FALSE_ALARM as ALPHA, LEAST_SCALE};
 use crate::uncertainty::quality::BY_CHANCE;
 use handeye_geometry::statistics::{better_by_chance, outliers};
 
@@ -16,8 +16,6 @@ const FOLDS: usize = 5;
 /// Two explanations count as equally good when the noise that they leave the robot, position times orientation, differs by
 /// less than this factor: it is known to a quarter or so in a session of ten views.
 const AS_GOOD: f64 = 1.5;
-/// Size below which a hypothesis, however certain, is left alone: a print is true to a few parts in a thousand.
-pub(super) const LEAST_SCALE: f64 = 3e-3;
 /// Deflection over the length of the board: a sheet on a flat plate keeps below it.
 const LEAST_WARP: f64 = 2e-3;
 /// Relative error of a focal length.

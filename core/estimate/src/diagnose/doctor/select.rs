@@ -2,7 +2,7 @@
 //! judged again beside it.
 
 use super::effect::Effect;
-use super::judge::{Judged, LEAST_SCALE, confirm, judge};
+use super::judge::{Judged, confirm, judge};
 use super::model::{Fit, KnownArm, Levels, Model, State};
 use super::screen::{Candidate, screened};
 use super::views::SessionViews;
@@ -11,6 +11,7 @@ use crate::TargetSize;
 use crate::arm_fit::ArmFit;
 use crate::diagnose::hypotheses::agreement::Agreement;
 use crate::handeye::joint::pose_dependent_error::Places;
+use crate::size::LEAST_SCALE;
 use handeye_geometry::progress::Work;
 
 /// Least views: twelve unknowns, six of a hypothesis, and noise levels to judge them by.
