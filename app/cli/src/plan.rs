@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use handeye_estimate::diagnose::calibrate;
+use handeye_estimate::diagnose::calibrate_with;
+use handeye_estimate::diagnose::findings::FindingOptions;
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::uncertainty::quality::TipBox;
-use handeye_estimate::{CalibrateError, Method};
+use handeye_estimate::{CalibrateError, Method, Options};
 use handeye_geometry::frames::{Frame, Pose};
 use handeye_plan::guided::choose::Proposal;
 use handeye_plan::guided::{Guide, GuidedOptions, Known, Next, Why};
@@ -16,6 +17,9 @@ use serde::Serialize;
 use super::output::Output;
 use crate::{Failure, box_arg, out, solve};
 use handeye_workbench::arguments::heading;
+
+/// An error that is the distance from a tool to a point of the board by corrected commands.
+const REACH_CORRECTED: &str = "reach_corrected";
 
 /// Options of `handeye plan`.
 #[derive(Debug, Args)]
@@ -42,7 +46,10 @@ pub struct PlanArgs {
 struct PlanDocument {
     format: &'static str,
     version: u32,
-    /// The error now by the noise alone, 95 %, millimetres.
+    /// What errors are of: `reach_corrected`, the distance from a tool to a point of the board by corrected commands, where the joints
+    /// of the arm are known; else `point`, a measured point by the noise alone.
+    error_of: &'static str,
+    /// The error now, 95 %, millimetres.
     error_mm: f64,
     poses: Vec<PlannedPose>,
 }
@@ -71,8 +78,11 @@ impl<Dst: Frame, Src: Frame> From<&Pose<Dst, Src>> for Transform {
 /// Prints the poses. Whether an arm reaches them is not known here.
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
-    let observations = solve::read(&args.path, &cancel)?.seen.observations;
-    let calibration = calibrate(&observations, Method::Joint, &cancel).map_err(|error| match error {
+    let seen = solve::read(&args.path, &cancel)?.seen;
+    let observations = seen.observations;
+    let wanted = FindingOptions::default().with_arm(seen.arm.as_ref());
+    let solved = calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel);
+    let calibration = solved.map_err(|error| match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),
         error => solve::unsolved(error, &args.path, &observations, &cancel),
     })?;
@@ -93,12 +103,13 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         ..GuidedOptions::default()
     };
     let known = Known { observations: &observations, calibration: Some(&calibration), robot: None, elapsed_s: 0.0 };
-    let next = Guide::new(options).next(&known, &cancel);
+    let mut guide = Guide::new(options);
+    let next = guide.next(&known, &cancel);
     if cancel.is_cancelled() {
         return Err(Failure::failed(HandEyeError::Cancelled));
     }
-    let (plan, error_m) = match next {
-        Next::Go { plan, why: Why::Gain { from_m, .. } } => (plan, from_m),
+    let plan = match next {
+        Next::Go { plan, why: Why::Gain { .. } } => plan,
         Next::Go { .. } | Next::End(_) => {
             return Err(Failure::failed(anyhow::anyhow!(
                 "the views of {} do not determine an answer that poses could be planned from; `handeye doctor` says why",
@@ -106,13 +117,16 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
             )));
         }
     };
+    let expected = |ratio: f64| guide.expected_m(&known, ratio).unwrap_or((f64::NAN, false));
     let pose = |proposal: &Proposal| PlannedPose {
         base_from_tip: (&proposal.base_from_tip).into(),
         camera_from_target: (&proposal.camera_from_target).into(),
-        error_mm: error_m * proposal.error_ratio * 1e3,
+        error_mm: expected(proposal.error_ratio).0 * 1e3,
     };
     let poses = plan.proposals.iter().map(pose).collect();
-    let document = PlanDocument { format: "handeye-plan", version: 1, error_mm: error_m * 1e3, poses };
+    let (error_m, is_of_reach) = expected(1.0);
+    let error_of = if is_of_reach { REACH_CORRECTED } else { "point" };
+    let document = PlanDocument { format: "handeye-plan", version: 1, error_of, error_mm: error_m * 1e3, poses };
     if let Some(output) = &args.json {
         let text = serde_json::to_string_pretty(&document).map_err(Failure::failed)?;
         output.write(format!("{text}\n").as_bytes())?;
@@ -121,8 +135,14 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
 }
 
 fn table(document: &PlanDocument) -> String {
-    let mut text = format!("expected error now, by the noise alone: {:.3} mm (95 %)\n", document.error_mm);
-    text += "poses of the tip in the base; whether the arm reaches them is not checked\n";
+    let is_of_reach = document.error_of == REACH_CORRECTED;
+    let (what, reached) = if is_of_reach {
+        ("a tool arrives now, by corrected commands, within", "whether the way there is free")
+    } else {
+        ("expected error now, by the noise alone:", "whether the arm reaches them")
+    };
+    let mut text = format!("{what} {:.3} mm (95 %)\n", document.error_mm);
+    let _written = writeln!(text, "poses of the tip in the base; {reached} is not checked");
     text += "      x [mm]    y [mm]    z [mm]       qx       qy       qz       qw   then [mm]\n";
     for (index, pose) in document.poses.iter().enumerate() {
         let [x, y, z] = pose.base_from_tip.translation_m.map(|m| m * 1e3);

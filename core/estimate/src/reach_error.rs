@@ -213,6 +213,19 @@ impl Reach {
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
 
+    /// The joints at the tip where the arm stands with it there, see [`Arm::tip_from_joints`], as in the view that is nearest; `None` where
+    /// the arm does not get there from that view.
+    pub fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>) -> Option<Vec<Isometry3<f64>>> {
+        let arm = &self.as_it_is.arm.arm;
+        let turn = |seen: &&Seen| {
+            let there = arm.forward(&seen.joints_rad).ok();
+            there.map_or(f64::INFINITY, |there| there.rotation().angle_to(&base_from_tip.rotation()))
+        };
+        let nearest = self.views.iter().min_by(|a, b| turn(a).total_cmp(&turn(b)))?;
+        let joints_rad = arm.inverse_nearby(base_from_tip, &nearest.joints_rad)?;
+        arm.tip_from_joints(base_from_tip, &joints_rad).ok()
+    }
+
     /// Whether the camera is beside the arm.
     pub fn stands_still(&self) -> bool {
         self.corrected.hand_eye.mode() == Mode::EyeToHand

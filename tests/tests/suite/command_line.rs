@@ -250,6 +250,7 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
     assert!(output.status.success(), "{}", text(&output.stderr));
     let plan: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(plan["format"], "handeye-plan");
+    assert_eq!(plan["error_of"], "point", "its joints are not known");
     let result: Value =
         serde_json::from_str(&std::fs::read_to_string(session.join("result.json")).expect("a result")).expect("JSON");
     let (tip_from_camera, base_from_target) = (isometry(&result["hand_eye"]), isometry(&result["target"]));

@@ -127,6 +127,11 @@ impl Calibration {
         Some(by_arm.map_or(by_poses, |by_arm| by_poses.max(by_arm)))
     }
 
+    /// How near a tool arrives, and how the arm stands; `None` where its joints are not known, or nothing may be stated.
+    pub fn reach(&self) -> Option<&Reach> {
+        self.reach.as_ref()
+    }
+
     /// How far the errors of the arm put the answer from where the camera really is on it, at a point where it saw the target, metres, where
     /// that is most of the stated error: more views do not lower it.
     pub fn moved_by_arm_m(&self) -> Option<f64> {

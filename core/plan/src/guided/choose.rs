@@ -15,6 +15,7 @@ use handeye_arm::JointValues;
 use handeye_estimate::Observations;
 use handeye_estimate::handeye::HandEye;
 use handeye_estimate::handeye::joint::{ExpectedView, Posture, ViewModel};
+use handeye_estimate::reach_error::Reach;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::TargetSpec;
@@ -104,8 +105,10 @@ pub struct Chooser<'a> {
     pub target: &'a TargetSpec,
     /// Which views of it are looked for.
     pub range: &'a ViewRange,
-    /// The arm, if its chain is known.
+    /// The arm, if it is driven and its chain is known.
     pub robot: Option<&'a Robot>,
+    /// How the arm of the views stands, if its joints are known.
+    pub reach: Option<&'a Reach>,
     /// Tip poses of the views so far.
     pub taken: &'a [Pose<Base, Tip>],
     /// Ends the search: what is found is then shorter, or nothing.
@@ -189,7 +192,7 @@ impl Chooser<'_> {
             if !self.is_wanted(&base_from_tip, options) {
                 continue;
             }
-            let posture = self.posture(base_from_tip);
+            let Some(posture) = self.posture(base_from_tip) else { continue };
             let pixels = self.model.pixels(&posture, design.covariance());
             if !self.range.surely_shows(target, &pixels, options.doubt_factor) {
                 continue;
@@ -201,11 +204,14 @@ impl Chooser<'_> {
         pool
     }
 
-    /// How the arm stands there, where that matters to what a view says.
-    fn posture(&self, base_from_tip: Pose<Base, Tip>) -> Posture {
-        let robot = self.robot.filter(|_| self.model.has_arm());
-        let tip_from_joints = robot.map(|robot| robot.arm.tip_from_joints(&base_from_tip, &robot.joints));
-        Posture { base_from_tip, tip_from_joints: tip_from_joints.unwrap_or_default() }
+    /// How the arm stands there, where that matters to what a view says; `None` where an arm that is not driven does not get there.
+    fn posture(&self, base_from_tip: Pose<Base, Tip>) -> Option<Posture> {
+        let tip_from_joints = match (self.robot, self.reach) {
+            (Some(robot), _) if self.model.has_arm() => robot.arm.tip_from_joints(&base_from_tip, &robot.joints),
+            (None, Some(reach)) if self.model.has_arm() => reach.tip_from_joints(&base_from_tip)?,
+            _ => Vec::new(),
+        };
+        Some(Posture { base_from_tip, tip_from_joints })
     }
 
     /// Not where a view failed, and not turned too far from all views so far.

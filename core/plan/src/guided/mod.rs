@@ -38,6 +38,7 @@ use design::{Design, Part, Weight};
 use handeye_arm::JointValues;
 use handeye_estimate::diagnose::{Calibration, Promise, Promised};
 use handeye_estimate::handeye::joint::{ExpectedView, FIELD_VIEWS, Noise, Posture, ViewModel};
+use handeye_estimate::reach_error::Reach;
 use handeye_estimate::stated_uncertainty::StatedUncertainty;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_estimate::{Fit, Observations, ViewStatus};
@@ -425,9 +426,9 @@ impl Guide {
         if self.range.is_some() { Next::End(Ending::AnswerLost) } else { self.first_poses(known, cancel) }
     }
 
-    /// The error as the goal is asked of it, where views are chosen by it: where commands can be corrected, and the arm is driven.
+    /// The error as the goal is asked of it, where views are chosen by it: where commands can be corrected.
     fn by_arm(&self, known: &Known<'_>) -> Option<&JudgedError> {
-        let is_corrected = known.calibration?.reach_errors()?.corrected_95_m.is_some() && known.robot.is_some();
+        let is_corrected = known.calibration?.reach_errors()?.corrected_95_m.is_some();
         self.judged.as_ref().filter(|judged| judged.promised.of != Promise::Point && is_corrected)
     }
 
@@ -436,6 +437,12 @@ impl Guide {
         let (calibration, target) = (known.calibration?, &known.observations.target);
         let by_arm = self.by_arm(known).and_then(|_| ViewModel::of_arm(calibration, target));
         by_arm.or_else(|| ViewModel::new(calibration, target))
+    }
+
+    /// The 95 % error that is expected with this part left of what views lower, see [`Proposal::error_ratio`], metres, after
+    /// [`Self::next`], and whether it is what a tool arrives within by corrected commands: else it is that of a point by the noise alone.
+    pub fn expected_m(&self, known: &Known<'_>, ratio: f64) -> Option<(f64, bool)> {
+        Some((self.lowered(known)?.with_m(ratio), self.by_arm(known).is_some()))
     }
 
     /// The error that views lower.
@@ -503,12 +510,13 @@ impl Guide {
     /// What a choice stands on; `None` where the views so far determine nothing.
     fn ground<'c>(
         &self,
-        known: &Known<'_>,
+        known: &Known<'c>,
         model: &ViewModel,
         used: &[UsedView],
         cancel: &'c CancelToken,
     ) -> Option<Ground<'c>> {
-        let joint = known.calibration?.joint.as_ref()?;
+        let calibration = known.calibration?;
+        let (joint, reach) = (calibration.joint.as_ref()?, calibration.reach());
         let target = &known.observations.target;
         let views = expected_views(model, used);
         let tool_box = self.options.tool_box.as_ref();
@@ -526,7 +534,7 @@ impl Guide {
         let taken = used.iter().map(|view| view.posture.base_from_tip).collect();
         let room_m = if used.len() < CAREFUL_VIEWS { CAREFUL_ROOM_M } else { 0.0 };
         let robot = known.robot.map(|robot| with_board(robot, model.hand_eye(), known.observations, room_m));
-        Some(Ground { design, range, robot, taken, cancel })
+        Some(Ground { design, reach, range, robot, taken, cancel })
     }
 
     /// What failed was expected to be in the image: the estimate is worse than it says.
@@ -618,6 +626,7 @@ impl Lowered {
 /// What a choice stands on.
 struct Ground<'c> {
     design: Design,
+    reach: Option<&'c Reach>,
     range: ViewRange,
     robot: Option<Robot>,
     taken: Vec<Pose<Base, Tip>>,
@@ -631,6 +640,7 @@ impl Ground<'_> {
             target,
             range: &self.range,
             robot: self.robot.as_ref(),
+            reach: self.reach,
             taken: &self.taken,
             cancel: self.cancel,
         }

@@ -9,8 +9,9 @@
 //! # How it decides
 //! A gross fault is accused when it brings the board together at least three times better, and to within a twentieth
 //! of its distance. The others are fitted with noise levels of their own and judged by the F test with allowance for the
-//! number of alternatives, by a size that matters, and, where they change the model, by views held out. Errors of the robot
-//! that depend on where it stands ([`PoseDependentError`](crate::handeye::joint::PoseDependentError)) are part of every fit. What is accepted becomes a finding. Nothing is ever
+//! number of alternatives, by a size that matters, and, where they change the model, by views held out. The errors of an arm whose
+//! joints are known ([`ArmFit`](crate::ArmFit)), else those of the robot that depend on where it stands
+//! ([`PoseDependentError`](crate::handeye::joint::PoseDependentError)), are part of every fit. What is accepted becomes a finding. Nothing is ever
 //! applied.
 //!
 //! # Needs

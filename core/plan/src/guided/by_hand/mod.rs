@@ -7,7 +7,8 @@
 //! ([`Deviation`]), and whether it is good enough, which is also the case where it differs but says nearly as much.
 //!
 //! # Degenerate cases
-//! Whether the robot can get there is not known: a person skips what cannot be reached. The robot has to say where it is; a
+//! Whether the robot can get there is not known, but for an arm whose joints are recorded, of which poses are proposed that it gets
+//! to: a person skips what cannot be reached. The robot has to say where it is; a
 //! session without robot poses has no hand-eye calibration.
 
 mod deviation;
@@ -17,7 +18,8 @@ pub use deviation::Deviation;
 
 use super::design::Design;
 use super::{Ending, Guide, GuidedOptions, Known, LEAST_NOISE, Next, Why, at_least, used_views};
-use handeye_estimate::handeye::joint::ViewModel;
+use handeye_estimate::handeye::joint::{Posture, ViewModel};
+use handeye_estimate::reach_error::Reach;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -69,6 +71,8 @@ pub struct Wanted {
 struct Worth {
     model: ViewModel,
     design: Design,
+    /// How the arm stands, where its joints are known.
+    reach: Option<Reach>,
     /// Error with the view that is wanted over that without it.
     ratio: f64,
 }
@@ -184,12 +188,13 @@ impl HandGuide {
     }
 
     fn worth(&self, known: &Known<'_>, ratio: f64, cancel: &CancelToken) -> Option<Worth> {
-        let model = ViewModel::new(known.calibration?, &known.observations.target)?;
+        let model = self.guide.model(known)?;
         let noise = at_least(model.noise(), &LEAST_NOISE);
         let model = model.with_noise(noise);
         let used = used_views(known.observations, known.fit());
         let design = self.guide.ground(known, &model, &used, cancel)?.design;
-        Some(Worth { model, design, ratio })
+        let reach = known.calibration?.reach().filter(|_| model.has_arm()).cloned();
+        Some(Worth { model, design, reach, ratio })
     }
 }
 
@@ -214,9 +219,11 @@ impl Wanted {
 
     /// Whether a view from there lowers the error by nearly as much.
     fn says_as_much(&self, base_from_tip: &Pose<Base, Tip>) -> bool {
-        let Some(Worth { model, design, ratio }) = &self.worth else { return false };
+        let Some(Worth { model, design, reach, ratio }) = &self.worth else { return false };
         let all: Vec<usize> = (0..self.target.len()).collect();
-        let Some(view) = model.expected(&(*base_from_tip).into(), &all) else { return false };
+        let tip_from_joints = reach.as_ref().and_then(|reach| reach.tip_from_joints(base_from_tip));
+        let posture = Posture { base_from_tip: *base_from_tip, tip_from_joints: tip_from_joints.unwrap_or_default() };
+        let Some(view) = model.expected(&posture, &all) else { return false };
         let there = design.error_with_m(&view) / design.error_m();
         // Gains add up as logarithms.
         *ratio < 1.0 && there.ln() <= WORTH * ratio.ln()

@@ -116,3 +116,37 @@ fn another_view_that_says_as_much_is_as_good() {
     let again = cell.observations.views[5].base_from_tip.expect("a robot");
     assert!(!wanted.says_as_much(&again));
 }
+
+#[test]
+fn an_arm_whose_joints_are_recorded_is_planned_by_its_errors_though_nobody_drives_it() {
+    use super::super::design::Part;
+    use crate::testing::guided_cell::HiddenErrors;
+    use handeye_estimate::handeye::joint::Noise;
+    use handeye_simulate::session::REALISTIC;
+
+    let untold = HiddenErrors { links: Some((1.2e-3, 2.5e-4)), ..HiddenErrors::NOTHING };
+    let noise = Noise { robot_m: 2e-5, robot_rad: 4e-5, ..REALISTIC };
+    let mut cell = GuidedCell::new(CellSetup { untold, noise, ..CellSetup::new(CellArm::Ur5e, Mode::EyeInHand, 3) });
+    let run = cell.run(GuidedOptions { most_views: 10, ..options() });
+    let calibration = run.calibration.expect("ten views");
+    let reach = calibration.reach().expect("the joints are known");
+    let promised = calibration.promised(1e-9, None).expect("stated");
+    let first = cell.truth().camera_from_target(&cell.base_from_tip().into());
+    let known = cell.known(Some(&calibration), 0.0);
+    let mut guide = HandGuide::new(options());
+    let next = guide.next(&known, &first, cell.camera(), &CancelToken::default());
+    let HandNext::Take(wanted) = next else { panic!("{next:?}") };
+    let Some(Why::Gain { from_m, to_m, part }) = wanted.why else { panic!("{:?}", wanted.why) };
+    assert!((from_m - promised.error_m).abs() < 1e-12, "{from_m} m, stated {promised:?}");
+    assert!(to_m < from_m && to_m > promised.least_m, "{to_m} m of {from_m} m, {promised:?}");
+    assert_eq!(part, Part::Arm, "the camera is known far better");
+    // What is asked for the arm gets to, and from there a view says as much, as from elsewhere not.
+    let step = guide.guide().steps().last().expect("it was proposed");
+    assert!(reach.tip_from_joints(&step.base_from_tip).is_some());
+    let corners = hand::corners(wanted.intrinsics(), &wanted.camera_from_target).expect("the whole board");
+    assert!(wanted.judge(&corners, &step.base_from_tip).is_good);
+    let far = hand::corners(wanted.intrinsics(), &first).expect("the whole board");
+    assert!(!wanted.judge(&far, &cell.base_from_tip()).is_good);
+    let nowhere = Pose::from_isometry(nalgebra::Isometry3::translation(9.0, 0.0, 0.0));
+    assert_eq!(reach.tip_from_joints(&nowhere), None);
+}
