@@ -10,6 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::handeye::joint::SmallSample;
 use crate::uncertainty::quality::tip_error_95_at;
+use handeye_geometry::frames::{Camera, Mount, Pose};
 use handeye_geometry::{point_error, se3};
 
 /// Which error may be stated.
@@ -23,7 +24,8 @@ pub enum StatedUncertainty {
     Nothing,
 }
 
-/// Where the hand-eye transform would be by an explanation that the answer does not count on.
+/// Where the hand-eye transform would be by an explanation that the answer does not count on. Where the joints of the arm are known it is
+/// that of corrected poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
     /// `log(X⁻¹ X')` of the hand-eye transform `X` as it is and `X'` by the explanation, `[t; r]` in m and rad.
@@ -66,6 +68,18 @@ impl Alternative {
 }
 
 impl StatedUncertainty {
+    /// The same for the answer `other` where this is for the answer `own`: the explanations are where they are.
+    #[must_use]
+    pub(crate) fn of_another(&self, own: &Pose<Mount, Camera>, other: &Pose<Mount, Camera>) -> Self {
+        let Self::Moved(alternatives) = self else { return self.clone() };
+        let other_from_own = other.inverse() * *own;
+        let seen = |alternative: &Alternative| Alternative {
+            shift: se3::log(&(other_from_own.isometry() * se3::exp(&alternative.shift))),
+            covariance: alternative.covariance,
+        };
+        Self::Moved(alternatives.iter().map(seen).collect())
+    }
+
     /// How far explanations that the answer does not count on would move a `point` (camera coordinates, metres), metres;
     /// of several the one that moves it farthest. Zero where there is none.
     pub fn moved_m(&self, point: &Point3<f64>) -> f64 {

@@ -122,7 +122,13 @@ impl Calibration {
 
     /// The same at any `point`, camera coordinates in metres.
     pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
-        let by_poses = self.stated.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)?;
+        let stated = match self.fit.arm().zip(self.hand_eye.as_ref()) {
+            Some((arm, answer)) => {
+                &self.stated.of_another(&arm.hand_eye.mount_from_camera(), &answer.mount_from_camera())
+            }
+            None => &self.stated,
+        };
+        let by_poses = stated.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)?;
         let by_arm = self.of_links_by_arm().map(|([hand_eye, _], law)| hand_eye.error_95_m(law, point));
         Some(by_arm.map_or(by_poses, |by_arm| by_poses.max(by_arm)))
     }

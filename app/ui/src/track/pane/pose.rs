@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::style::numbers;
 use crate::style::parts;
-use handeye_wording::text;
+use handeye_wording::{Text, text};
 use handeye_workbench::model::{Model, RotationFormat, TrackError};
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
@@ -49,12 +49,38 @@ pub fn pose_ui(ui: &mut Ui, model: &Model) {
         parts::hint_ui(ui, how);
     }
     match &newest.update.estimate {
-        Some(estimate) => estimate_ui(ui, estimate, model.view.rotation, language),
+        Some(estimate) => {
+            estimate_ui(ui, estimate, model.view.rotation, language);
+            parts::hint_ui(ui, &calibration_text(model).in_language(language));
+        }
         None => parts::hint_ui(ui, tr!(language, "Where it is now is not known.")),
     }
     newest_image_ui(ui, &newest.update, language);
     if let Some(error) = newest.error {
         truth_ui(ui, error, language);
+    }
+}
+
+/// What the error of the calibration is, of which nothing is in the numbers of the estimate.
+fn calibration_text(model: &Model) -> Text {
+    let quality = model.solve.current().map(|solved| &solved.result.quality);
+    let reach = quality.and_then(|quality| Some((quality.reach_error_95_mm?, quality.reach_error_corrected_95_mm)));
+    let is_corrected = model.track.by.as_ref().is_some_and(|by| by.arm.is_some());
+    let shown = |mm: f64| format!("{mm:.2}");
+    match (reach, quality.and_then(|quality| quality.tip_error_95_mm)) {
+        (Some((_, Some(corrected_mm))), _) if is_corrected => text!(
+            "± is the noise of images and motion alone: by corrected commands a tool arrives within {mm} mm (95 %).",
+            mm = shown(corrected_mm)
+        ),
+        (Some((as_it_is_mm, _)), _) => text!(
+            "± is the noise of images and motion alone: a tool arrives within {mm} mm (95 %).",
+            mm = shown(as_it_is_mm)
+        ),
+        (None, Some(point_mm)) => text!(
+            "± is the noise of images and motion alone: the calibration puts a point within {mm} mm (95 %).",
+            mm = shown(point_mm)
+        ),
+        (None, None) => text!("± is the noise of images and motion alone: the error of the calibration is not known."),
     }
 }
 

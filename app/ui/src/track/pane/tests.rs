@@ -103,6 +103,7 @@ fn the_pose_is_told_in_millimetres_with_how_sure_it_is_and_in_the_chosen_rotatio
     assert!(pane.sees("roll pitch yaw [°]: 0.00 0.00 90.00"));
     assert!(pane.sees("± 95 % [°]: 0.00 0.00 0.11"));
     assert!(pane.sees("Velocity [mm/s]: 0.0 −6.3 0.0"));
+    assert!(pane.sees("± is the noise of images and motion alone"), "and nothing of the calibration");
     pane.model().view.rotation = RotationFormat::Quaternion;
     pane.steps();
     assert!(pane.sees("quaternion x y z w: 0.0000 0.0000 0.7071 0.7071"));
