@@ -1,11 +1,11 @@
 //! `handeye plan`: which poses would lower the expected error of a session or dataset folder most.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use handeye_estimate::diagnose::calibrate_with;
 use handeye_estimate::diagnose::findings::FindingOptions;
+use handeye_estimate::diagnose::{Promise, calibrate_with};
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::uncertainty::quality::TipBox;
 use handeye_estimate::{CalibrateError, Method, Options};
@@ -18,7 +18,8 @@ use super::output::Output;
 use crate::{Failure, box_arg, out, solve};
 use handeye_workbench::arguments::heading;
 
-/// An error that is the distance from a tool to a point of the board by corrected commands.
+/// An error that is the distance from a tool to a point of the board by commands as they are, and by corrected ones.
+const REACH: &str = "reach";
 const REACH_CORRECTED: &str = "reach_corrected";
 
 /// Options of `handeye plan`.
@@ -46,8 +47,9 @@ pub struct PlanArgs {
 struct PlanDocument {
     format: &'static str,
     version: u32,
-    /// What errors are of: `reach_corrected`, the distance from a tool to a point of the board by corrected commands, where the joints
-    /// of the arm are known; else `point`, a measured point by the noise alone.
+    /// What errors are of, where the joints of the arm are known: `reach_corrected`, the distance from a tool to a point of the board by
+    /// corrected commands, or `reach`, by commands as they are where correcting brings the tool no nearer. Else `point`, a measured point
+    /// by the noise alone.
     error_of: &'static str,
     /// The error now, 95 %, millimetres.
     error_mm: f64,
@@ -75,7 +77,7 @@ impl<Dst: Frame, Src: Frame> From<&Pose<Dst, Src>> for Transform {
     }
 }
 
-/// Prints the poses. Whether an arm reaches them is not known here.
+/// Prints the poses. Whether the way to them is free is not known here.
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let seen = solve::read(&args.path, &cancel)?.seen;
@@ -111,21 +113,24 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let plan = match next {
         Next::Go { plan, why: Why::Gain { .. } } => plan,
         Next::Go { .. } | Next::End(_) => {
-            return Err(Failure::failed(anyhow::anyhow!(
-                "the views of {} do not determine an answer that poses could be planned from; `handeye doctor` says why",
-                args.path.display()
-            )));
+            return Err(undetermined(&args.path));
         }
     };
-    let expected = |ratio: f64| guide.expected_m(&known, ratio).unwrap_or((f64::NAN, false));
-    let pose = |proposal: &Proposal| PlannedPose {
-        base_from_tip: (&proposal.base_from_tip).into(),
-        camera_from_target: (&proposal.camera_from_target).into(),
-        error_mm: expected(proposal.error_ratio).0 * 1e3,
+    let expected = |ratio: f64| guide.expected_m(&known, ratio).ok_or_else(|| undetermined(&args.path));
+    let pose = |proposal: &Proposal| -> Result<PlannedPose, Failure> {
+        Ok(PlannedPose {
+            base_from_tip: (&proposal.base_from_tip).into(),
+            camera_from_target: (&proposal.camera_from_target).into(),
+            error_mm: expected(proposal.error_ratio)?.0 * 1e3,
+        })
     };
-    let poses = plan.proposals.iter().map(pose).collect();
-    let (error_m, is_of_reach) = expected(1.0);
-    let error_of = if is_of_reach { REACH_CORRECTED } else { "point" };
+    let poses = plan.proposals.iter().map(pose).collect::<Result<_, _>>()?;
+    let (error_m, of) = expected(1.0)?;
+    let error_of = match of {
+        Promise::Point => "point",
+        Promise::Reach => REACH,
+        Promise::ReachCorrected => REACH_CORRECTED,
+    };
     let document = PlanDocument { format: "handeye-plan", version: 1, error_of, error_mm: error_m * 1e3, poses };
     if let Some(output) = &args.json {
         let text = serde_json::to_string_pretty(&document).map_err(Failure::failed)?;
@@ -134,12 +139,18 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     if args.json.as_ref().is_some_and(Output::is_standard) { Ok(()) } else { out::print(&table(&document)) }
 }
 
+fn undetermined(folder: &Path) -> Failure {
+    Failure::failed(anyhow::anyhow!(
+        "the views of {} do not determine an answer that poses could be planned from; `handeye doctor` says why",
+        folder.display()
+    ))
+}
+
 fn table(document: &PlanDocument) -> String {
-    let is_of_reach = document.error_of == REACH_CORRECTED;
-    let (what, reached) = if is_of_reach {
-        ("a tool arrives now, by corrected commands, within", "whether the way there is free")
-    } else {
-        ("expected error now, by the noise alone:", "whether the arm reaches them")
+    let (what, reached) = match document.error_of {
+        REACH_CORRECTED => ("a tool arrives now, by corrected commands, within", "whether the way there is free"),
+        REACH => ("a tool arrives now within", "whether the way there is free"),
+        _ => ("expected error now, by the noise alone:", "whether the arm reaches them"),
     };
     let mut text = format!("{what} {:.3} mm (95 %)\n", document.error_mm);
     let _written = writeln!(text, "poses of the tip in the base; {reached} is not checked");

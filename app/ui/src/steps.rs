@@ -2,7 +2,6 @@
 
 use handeye_estimate::GOOD_VIEWS;
 use handeye_estimate::handeye::motion::MIN_VIEWS;
-use handeye_estimate::verify::Verification;
 use handeye_session::Role;
 
 use super::status::STALE_AFTER_S;
@@ -98,10 +97,9 @@ impl Facts {
             sequence_runs: model.sequence_runs,
             verifying: document.captures.iter().filter(|it| it.role == Role::Verification && !it.excluded).count(),
             verified: current.is_some_and(|solved| matches!(solved.verification, Some(Ok(_)))),
-            contradicted: current.is_some_and(|solved| {
-                let verification = solved.verification.as_ref().and_then(|outcome| outcome.as_ref().ok());
-                verification.and_then(Verification::is_as_stated) == Some(false)
-            }),
+            contradicted: current
+                .and_then(|solved| solved.verification_in_use()?.is_as_stated())
+                .is_some_and(|is_as_stated| !is_as_stated),
             exported: model.export.is_present && current.is_some(),
             tracking: model.track.on,
             out_of_sight: model.track.newest.as_ref().is_some_and(|newest| newest.update.estimate.is_none()),

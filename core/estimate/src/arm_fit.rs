@@ -120,8 +120,8 @@ impl ArmFit {
 }
 
 /// The same with the size of the target free, where the views ask for it: a target that is some thousandths larger than stated makes
-/// an arm look as much longer, by more than its own errors. Of real arms some are longer in all links by a thousandth or two, which no
-/// view tells from such a target: less than a print may be off is the arm's.
+/// an arm look as much longer, by more than its own errors. Some real arms are longer in all links by a thousandth or two, which no
+/// view tells from such a target: a size that is off by less than prints may be is left as stated.
 fn with_shown_size<'a>(
     stated: &JointProblem<'a>,
     fit: JointSolution,

@@ -32,8 +32,8 @@ use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::se3;
 use handeye_geometry::targets::TargetSpec;
 
-/// Touches of a session. Where the arm is known far better than it is true, a quantile over them is all that is asked, and that over a
-/// few is too small: by 3 % of the probability with 24 of them, by 1 % with these.
+/// Touches of a session. The error of commands as they are is almost the same in every draw, so that its quantile is one over the
+/// touches, which is too small over a few: by 3 % of the probability with 24 of them, by 1 % with these.
 const TOUCHES: usize = 96;
 /// Draws of arm and camera.
 const DRAWS: usize = 100;
@@ -75,7 +75,7 @@ pub struct ReachErrors {
     pub corrected_95_m: Option<f64>,
     /// The part of the first that no view lowers: what the arm is off by its most probable errors, and does not repeat.
     pub as_it_is_least_95_m: f64,
-    /// The part of the other that no view lowers: what the arm does not repeat, at the view and at the touch.
+    /// The part of the other that no view lowers: what the arm does not repeat, at the view, at the touch and where the tool is found.
     pub repeatability_95_m: f64,
 }
 
@@ -146,6 +146,8 @@ pub struct Reach {
     as_it_is: Way,
     corrected: Way,
     views: Vec<Seen>,
+    /// How the tip is turned in them, as reported.
+    turned: Vec<UnitQuaternion<f64>>,
     tool: Vector3<f64>,
     /// Turns about one point by which the tool is found.
     turns: Vec<UnitQuaternion<f64>>,
@@ -179,6 +181,8 @@ impl Reach {
     ) -> Option<Self> {
         let as_it_is = CorrectedArm { errors: ArmErrors::none(fit.errors.joint_count()), ..arm.clone() };
         let axis = mean_axis(&arm.arm, &views)?;
+        let turned = |seen: &Seen| Some(arm.arm.forward(&seen.joints_rad).ok()?.rotation());
+        let turned = views.iter().map(turned).collect::<Option<_>>()?;
         let mut random = Draw::new(SEED);
         let turn = |random: &mut Draw| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5));
         let turns = (0..PIVOTS).map(|_| turn(&mut random)).collect();
@@ -188,6 +192,7 @@ impl Reach {
             as_it_is: Way { hand_eye: *answer, arm: as_it_is, axis },
             corrected: Way { hand_eye: fit.hand_eye, arm: arm.clone(), axis },
             views,
+            turned,
             tool: *tool,
             turns,
             repeated: possible.iter().map(best).collect(),
@@ -217,11 +222,9 @@ impl Reach {
     /// the arm does not get there from that view.
     pub fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>) -> Option<Vec<Isometry3<f64>>> {
         let arm = &self.as_it_is.arm.arm;
-        let turn = |seen: &&Seen| {
-            let there = arm.forward(&seen.joints_rad).ok();
-            there.map_or(f64::INFINITY, |there| there.rotation().angle_to(&base_from_tip.rotation()))
-        };
-        let nearest = self.views.iter().min_by(|a, b| turn(a).total_cmp(&turn(b)))?;
+        let there = base_from_tip.rotation();
+        let turns = self.turned.iter().map(|turned| turned.angle_to(&there));
+        let (nearest, _) = self.views.iter().zip(turns).min_by(|a, b| a.1.total_cmp(&b.1))?;
         let joints_rad = arm.inverse_nearby(base_from_tip, &nearest.joints_rad)?;
         arm.tip_from_joints(base_from_tip, &joints_rad).ok()
     }
@@ -386,7 +389,7 @@ impl Way {
         tool: &Vector3<f64>,
     ) -> Option<Vector3<f64>> {
         let (mut information, mut right) = (Matrix6::zeros(), Vector6::zeros());
-        for ((at, turn), unexplained) in pivots.iter().zip(&truth.unexplained.at_pivots) {
+        for ((at, turn), unexplained) in pivots.iter().zip(&truth.unexplained.pivots) {
             let believed_from_true = at.tip(&self.arm.errors).inverse() * at.tip(&truth.errors) * unexplained;
             let place = (believed_from_true * Point3::from(*tool)).coords;
             let mut row = Matrix3x6::zeros();
@@ -403,9 +406,9 @@ impl Way {
 
     /// From the point to the tip of the tool.
     fn miss(touch: &Touch, draw: &Possible, tool: &Vector3<f64>, found: &Vector3<f64>) -> Vector3<f64> {
-        let at_view = touch.view.tip(&draw.errors) * draw.unexplained.at_view;
+        let at_view = touch.view.tip(&draw.errors) * draw.unexplained.view;
         let point = Self::camera(&draw.hand_eye, &at_view) * touch.in_camera;
-        let tip = touch.command.tip(&draw.errors) * draw.unexplained.at_touch * Point3::from(*tool);
+        let tip = touch.command.tip(&draw.errors) * draw.unexplained.touch * Point3::from(*tool);
         // The command was for the tool as it is.
         tip - point - touch.turn * (found - tool)
     }
@@ -419,25 +422,24 @@ struct Possible {
     unexplained: Unexplained,
 }
 
-/// What the errors of an arm do not explain of its poses.
+/// What the errors of an arm do not explain of its poses at a view, at a touch and where the tool is found.
 #[derive(Debug, Clone)]
 struct Unexplained {
-    at_view: Isometry3<f64>,
-    at_touch: Isometry3<f64>,
-    /// Where the tool was found.
-    at_pivots: [Isometry3<f64>; PIVOTS],
+    view: Isometry3<f64>,
+    touch: Isometry3<f64>,
+    pivots: [Isometry3<f64>; PIVOTS],
 }
 
 impl Unexplained {
     fn nothing() -> Self {
         let still = Isometry3::identity();
-        Self { at_view: still, at_touch: still, at_pivots: [still; PIVOTS] }
+        Self { view: still, touch: still, pivots: [still; PIVOTS] }
     }
 
     fn draw(fit: &ArmFit, random: &mut Draw) -> Self {
         let sigma = |i: usize| if i < 3 { fit.noise.robot_m } else { fit.noise.robot_rad };
         let mut next = || se3::exp(&Vector6::from_fn(|i, _| sigma(i) * random.normal()));
-        Self { at_view: next(), at_touch: next(), at_pivots: std::array::from_fn(|_| next()) }
+        Self { view: next(), touch: next(), pivots: std::array::from_fn(|_| next()) }
     }
 }
 

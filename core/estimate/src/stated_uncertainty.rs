@@ -61,6 +61,12 @@ impl Alternative {
         }
     }
 
+    /// The same from another answer.
+    pub(crate) fn seen_from(&self, other_from_own: &Pose<Camera, Camera>) -> Self {
+        let shift = se3::log(&(other_from_own.isometry() * se3::exp(&self.shift)));
+        Self { shift, covariance: self.covariance }
+    }
+
     /// Mean square of the error of the answer as it is where this is the truth, `[t; r]`.
     pub fn mean_square(&self) -> Matrix6<f64> {
         self.covariance + self.shift * self.shift.transpose()
@@ -73,11 +79,7 @@ impl StatedUncertainty {
     pub(crate) fn of_another(&self, own: &Pose<Mount, Camera>, other: &Pose<Mount, Camera>) -> Self {
         let Self::Moved(alternatives) = self else { return self.clone() };
         let other_from_own = other.inverse() * *own;
-        let seen = |alternative: &Alternative| Alternative {
-            shift: se3::log(&(other_from_own.isometry() * se3::exp(&alternative.shift))),
-            covariance: alternative.covariance,
-        };
-        Self::Moved(alternatives.iter().map(seen).collect())
+        Self::Moved(alternatives.iter().map(|alternative| alternative.seen_from(&other_from_own)).collect())
     }
 
     /// How far explanations that the answer does not count on would move a `point` (camera coordinates, metres), metres;

@@ -11,7 +11,8 @@
 //! point, is sent to points that the camera saw; the distance between the two is printed, RMS over 40 points a session. Beside it
 //! stands what a point in space is off by the hand-eye transform alone, and what is stated of that; what no view can tell from the
 //! transform (the arm's first joint, the zero of its last) is no error of it.
-//! Nothing of the truth comes from the estimator: chains, joints, lens and noise are written out here or in `handeye_simulate`.
+//! Nothing of the truth of a touch comes from the estimator: chains, joints, lens and noise are written out here or in
+//! `handeye_simulate`. What belongs to the gauge in space follows the convention of the estimator, by its own errors of an arm.
 
 mod cell;
 mod chain;

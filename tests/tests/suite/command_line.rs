@@ -250,10 +250,12 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
     assert!(output.status.success(), "{}", text(&output.stderr));
     let plan: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(plan["format"], "handeye-plan");
-    assert_eq!(plan["error_of"], "point", "its joints are not known");
+    let of = plan["error_of"].as_str().expect("named");
+    assert!(["reach", "reach_corrected"].contains(&of), "its joints are known: {of}");
     let result: Value =
         serde_json::from_str(&std::fs::read_to_string(session.join("result.json")).expect("a result")).expect("JSON");
-    let (tip_from_camera, base_from_target) = (isometry(&result["hand_eye"]), isometry(&result["target"]));
+    let (tip_from_camera, base_from_target) =
+        (isometry(&result["arm"]["hand_eye"]), isometry(&result["arm"]["target"]));
     let of_camera = |key: &str| result["intrinsics"][key].as_f64().expect(key);
     let poses = plan["poses"].as_array().expect("poses");
     assert_eq!(poses.len(), 3);
@@ -264,7 +266,8 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
         before_mm = error_mm;
         let camera_from_target = (isometry(&pose["base_from_tip"]) * tip_from_camera).inverse() * base_from_target;
         let reported = isometry(&pose["camera_from_target"]);
-        assert!((camera_from_target.translation.vector - reported.translation.vector).norm() < 1e-4, "{pose}");
+        // But for what the errors of this arm, which is nearly exact, put it off.
+        assert!((camera_from_target.translation.vector - reported.translation.vector).norm() < 1e-3, "{pose}");
         // The outermost of the 10×7 corners; the lens of this cell bends nothing.
         for corner in [[0.0, 0.0], [0.135, 0.0], [0.0, 0.09], [0.135, 0.09]] {
             let at = camera_from_target * Point3::new(corner[0], corner[1], 0.0);
@@ -275,7 +278,7 @@ fn poses_are_planned_for_a_recorded_session_from_which_the_whole_board_is_seen()
     let again = handeye(&["--quiet", "plan", utf8(&session), "--count", "3", "--json", "-"]);
     assert_eq!(again.stdout, output.stdout, "the same every time");
     let table = text(&handeye(&["--quiet", "plan", utf8(&session)]).stdout);
-    assert!(table.contains("whether the arm reaches them is not checked"), "{table}");
+    assert!(table.contains("whether the way there is free is not checked"), "{table}");
 }
 
 #[test]

@@ -56,6 +56,13 @@ pub struct Corrected {
 }
 
 impl Solved {
+    /// The verification by the tip poses that tools are sent by: corrected ones, where these are expected to bring the tip nearer.
+    pub fn verification_in_use(&self) -> Option<&Verification> {
+        let corrected = self.corrected.as_ref().filter(|_| self.result.quality.correcting_helps());
+        let corrected = corrected.and_then(|corrected| corrected.verification.as_ref());
+        corrected.or_else(|| self.verification.as_ref()?.as_ref().ok())
+    }
+
     /// The error that a goal \[m\] is asked of; `None` where none may be stated.
     pub fn promised(&self, goal_m: f64) -> Option<Promised> {
         let quality = &self.result.quality;

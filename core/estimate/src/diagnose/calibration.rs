@@ -24,6 +24,7 @@
 //! }
 //! ```
 
+use std::borrow::Cow;
 use std::ops::Deref;
 
 use nalgebra::Point3;
@@ -122,15 +123,24 @@ impl Calibration {
 
     /// The same at any `point`, camera coordinates in metres.
     pub fn error_95_m(&self, point: &Point3<f64>) -> Option<f64> {
-        let stated = match self.fit.arm().zip(self.hand_eye.as_ref()) {
-            Some((arm, answer)) => {
-                &self.stated.of_another(&arm.hand_eye.mount_from_camera(), &answer.mount_from_camera())
-            }
-            None => &self.stated,
-        };
-        let by_poses = stated.error_95_m(self.hand_eye_covariance()?, self.joint.as_ref()?.small_sample, point)?;
+        let by_poses = self.stated_of_answer().error_95_m(
+            self.hand_eye_covariance()?,
+            self.joint.as_ref()?.small_sample,
+            point,
+        )?;
         let by_arm = self.of_links_by_arm().map(|([hand_eye, _], law)| hand_eye.error_95_m(law, point));
         Some(by_arm.map_or(by_poses, |by_arm| by_poses.max(by_arm)))
+    }
+
+    /// Which error may be stated of the answer by reported poses. What was found is counted from the answer that goes with the errors of
+    /// the arm where these are known.
+    fn stated_of_answer(&self) -> Cow<'_, StatedUncertainty> {
+        match self.fit.arm().zip(self.hand_eye.as_ref()) {
+            Some((arm, answer)) => {
+                Cow::Owned(self.stated.of_another(&arm.hand_eye.mount_from_camera(), &answer.mount_from_camera()))
+            }
+            None => Cow::Borrowed(&self.stated),
+        }
     }
 
     /// How near a tool arrives, and how the arm stands; `None` where its joints are not known, or nothing may be stated.
@@ -171,7 +181,7 @@ impl Calibration {
     pub fn moved_m(&self) -> Option<f64> {
         let joint = self.joint.as_ref()?;
         let (covariance, law) = (self.hand_eye_covariance()?, joint.small_sample);
-        let (moved_m, _) = self.stated.parts_95_m(covariance, law, &joint.reference_point)?;
+        let (moved_m, _) = self.stated_of_answer().parts_95_m(covariance, law, &joint.reference_point)?;
         (moved_m >= resolution::PLACE_M).then_some(moved_m)
     }
 

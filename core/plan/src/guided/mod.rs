@@ -130,7 +130,7 @@ pub struct Known<'a> {
     pub observations: &'a Observations,
     /// What they give; `None` while they do not determine an answer.
     pub calibration: Option<&'a Calibration>,
-    /// The arm; `None` where its chain is not known.
+    /// The arm; `None` where its chain is not known, and where it is not driven.
     pub robot: Option<&'a Robot>,
     /// Since the beginning, seconds.
     pub elapsed_s: f64,
@@ -440,9 +440,10 @@ impl Guide {
     }
 
     /// The 95 % error that is expected with this part left of what views lower, see [`Proposal::error_ratio`], metres, after
-    /// [`Self::next`], and whether it is what a tool arrives within by corrected commands: else it is that of a point by the noise alone.
-    pub fn expected_m(&self, known: &Known<'_>, ratio: f64) -> Option<(f64, bool)> {
-        Some((self.lowered(known)?.with_m(ratio), self.by_arm(known).is_some()))
+    /// [`Self::next`], and what it is of: of a point it is that by the noise alone.
+    pub fn expected_m(&self, known: &Known<'_>, ratio: f64) -> Option<(f64, Promise)> {
+        let of = self.by_arm(known).map_or(Promise::Point, |judged| judged.promised.of);
+        Some((self.lowered(known)?.with_m(ratio), of))
     }
 
     /// The error that views lower.

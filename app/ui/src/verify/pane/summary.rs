@@ -39,14 +39,15 @@ pub fn summary_ui(ui: &mut Ui, model: &Model, verification: &Verification, corre
         language,
         "How much the position of the board differs from capture to capture. A board that was moved leaves it small while every prediction is wrong"
     ));
-    verdict_ui(ui, language, verification);
-    if let Some(corrected) = corrected {
-        parts::hint_ui(ui, tr!(language, "Corrected:"));
-        verdict_ui(ui, language, corrected);
-    }
+    let Some(corrected) = corrected else { return verdict_ui(ui, language, verification, false) };
+    parts::hint_ui(ui, tr!(language, "Corrected:"));
+    verdict_ui(ui, language, corrected, false);
+    parts::hint_ui(ui, tr!(language, "As reported:"));
+    verdict_ui(ui, language, verification, corrected.is_as_stated() == Some(true));
 }
 
-fn verdict_ui(ui: &mut Ui, language: Language, verification: &Verification) {
+/// `explained` where corrected tip poses have no such errors.
+fn verdict_ui(ui: &mut Ui, language: Language, verification: &Verification, explained: bool) {
     let palette = Palette::of(ui);
     let (colour, verdict) = match &verification.consistency {
         None => (palette.weak, text!("The calibration states no uncertainty to compare these errors with")),
@@ -62,6 +63,15 @@ fn verdict_ui(ui: &mut Ui, language: Language, verification: &Verification) {
                     limit = limit
                 );
                 (palette.good, text)
+            } else if explained {
+                let text = text!(
+                    "The errors are larger than the calibration by reported tip poses states: their mean square is {ratio} times \
+                     the expected one, and at most {limit} times in 99 of 100 cases. Corrected tip poses do not have them: they are \
+                     those of the arm",
+                    ratio = ratio,
+                    limit = limit
+                );
+                (palette.weak, text)
             } else {
                 let text = text!(
                     "The errors are larger than the calibration states: their mean square is {ratio} times the expected \

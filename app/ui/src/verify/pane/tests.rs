@@ -1,5 +1,5 @@
 use handeye_capture::Wait;
-use handeye_estimate::verify::VerifyError;
+use handeye_estimate::verify::{Verification, VerifyError};
 use handeye_session::{CaptureId, Role};
 use nalgebra::Vector2;
 use std::sync::Arc;
@@ -142,6 +142,15 @@ fn where_the_errors_of_the_arm_are_known_predictions_and_points_are_also_by_corr
     let twice = |depth_m| MeasuredTwice { from_depth: Ok(at(depth_m)), from_board: Ok(at(depth_m)) };
     let pixel = ImagePoint { column: 320, row: 240 };
     model.picked = Some(PickedPoint { pixel, as_reported: twice(0.3), corrected: Some(twice(0.31)) });
+    // Reported tip poses are off by more than the calibration by them states, corrected ones are not.
+    let mut worse = sample::with_errors_of_the_arm();
+    let solved = Arc::make_mut(worse.solve.solved.as_mut().expect("solved"));
+    let Some(Ok(verification)) = &mut solved.verification else { panic!("verified") };
+    verification.consistency.as_mut().expect("stated").ratio = 9.0;
+    assert_eq!(solved.verification_in_use().and_then(Verification::is_as_stated), Some(true));
+    let pane = driven(worse);
+    assert!(pane.sees("As reported:") && pane.sees("Corrected tip poses do not have them: they are those of the arm"));
+    assert!(!pane.sees("The board may have been moved"));
     let solved = model.solve.solved.as_ref().expect("solved");
     let reported = solved.verification.as_ref().and_then(|it| it.as_ref().ok()).expect("verified").centre_rms_m;
     let pane = driven(model.clone());

@@ -45,8 +45,6 @@ pub(super) struct Judged {
     ln_alternatives: f64,
     /// Whether it stands beside the one that was taken in first: the robot's poses cannot tell the two apart.
     pub as_good: bool,
-    /// Whether the errors of the arm are in the model.
-    beside_arm: bool,
     /// Prediction of held-out views without and with it.
     pub held_out: Option<(HeldOut, HeldOut)>,
     /// Noise of the robot without and with it.
@@ -82,7 +80,7 @@ impl Judged {
             // Corners say it themselves, each of hundreds; views are left out, not modelled.
             (Candidate::Effect(Effect::Warp | Effect::Lens | Effect::Centre) | Candidate::Views(_), _) => true,
             // Errors of the arm predict what a size or a zero does as well as these do; what is likelier is another question.
-            (Candidate::Effect(Effect::Scale | Effect::Joint(_)), _) if self.beside_arm => true,
+            (Candidate::Effect(Effect::Scale | Effect::Joint(_)), _) if self.fit.has_arm() => true,
             (Candidate::Effect(_), None) => false,
             (Candidate::Effect(_), Some((without, with))) => with.is_better_than(without, self.ln_alternatives),
         };
@@ -143,7 +141,6 @@ pub(super) fn judge(model: &Model<'_>, state: &State, before: &Fit, candidate: C
         matters: false,
         ln_alternatives,
         as_good: false,
-        beside_arm: model.arm().is_some(),
         held_out: None,
         robot: [level(0), level(1)],
         fit,

@@ -253,9 +253,10 @@ fn examine(
         if work.is_cancelled() { cancelled() } else { "the views leave a direction of the answer open".to_owned() }
     })?;
     let size = calibration.and_then(|calibration| calibration.joint.as_ref()?.size.as_ref());
-    let selection = match size {
-        Some(size) => selection.with_size(size),
-        None => selection,
+    let selection = match (arm, size) {
+        (Some(arm), _) => selection.with_size_beside_arm(arm),
+        (None, Some(size)) => selection.with_size(size),
+        (None, None) => selection,
     };
     let mut fine = words::fine(&selection);
     if let Some(calibration) = calibration {

@@ -39,8 +39,8 @@ const FIELD_PARTS: usize = 4;
 const PARTS: usize = FIELD_PARTS + LEVELS_OF_ARMS.len();
 /// Smallest noise levels of the robot, m and rad: nothing is judged by less.
 const LEAST: [f64; 2] = [resolution::PLACE_M, resolution::ANGLE_RAD];
-/// Smallest levels of the field, m and rad: below it nothing changes now.
-const LEAST_FIELD: f64 = 1e-6;
+/// Smallest levels of the random effects, m and rad: below it nothing changes now.
+const LEAST_EFFECT: f64 = 1e-6;
 /// Largest change of a variance in one step, as a logarithm.
 const LARGEST_STEP: f64 = 2.0;
 const MAX_STEPS: usize = 25;
@@ -49,9 +49,9 @@ const SETTLED: f64 = 1e-2;
 /// Slopes of the field that the data have to determine, together, for there to be one. It then explains about as much as
 /// a tenth of one more unknown would.
 const LEAST_DETERMINED: f64 = 0.1;
-/// Information on the logarithm of a variance of the field below which it changes nothing: its effects then stand out of
+/// Information on the logarithm of a variance of random effects below which it changes nothing: they then stand out of
 /// the noise by a thirtieth.
-const NO_FIELD: f64 = 1e-3;
+const NO_EFFECT: f64 = 1e-3;
 
 /// One view in the linear model.
 #[derive(Clone)]
@@ -255,7 +255,11 @@ impl<'a> Model<'a> {
 
     /// Whether a fit found that errors depend on where the robot stands: the data determine a part of the slopes.
     pub fn has_field(&self, fit: &Fit) -> bool {
-        fit.determined > (fit.width() - self.random()) as f64 + LEAST_DETERMINED
+        let of_field = self.parts().into_iter().zip(fit.levels.effects).take(FIELD_PARTS);
+        let determined = |(part, level): (Range<usize>, f64)| {
+            part.len() as f64 - part.map(|i| fit.covariance[(i, i)] / level).sum::<f64>()
+        };
+        of_field.map(determined).sum::<f64>() > LEAST_DETERMINED
     }
 
     fn slopes(&self) -> usize {
@@ -336,7 +340,7 @@ impl<'a> Model<'a> {
             return None;
         }
         let designs: Vec<DMatrix<f64>> = (0..self.rows.len()).map(|i| self.design(i, state, width)).collect();
-        let least: [f64; 2 + PARTS] = std::array::from_fn(|k| LEAST.get(k).copied().unwrap_or(LEAST_FIELD).powi(2));
+        let least: [f64; 2 + PARTS] = std::array::from_fn(|k| LEAST.get(k).copied().unwrap_or(LEAST_EFFECT).powi(2));
         let mut levels = Levels {
             noise: std::array::from_fn(|k| start.noise[k].max(least[k])),
             effects: std::array::from_fn(|k| start.effects[k].max(least[LEAST.len() + k])),
@@ -426,7 +430,7 @@ impl<'a> Model<'a> {
         }
         for k in 0..PARTS {
             // What does not show beside the noise is none.
-            if information[(k, k)] < NO_FIELD {
+            if information[(k, k)] < NO_EFFECT {
                 information.fill_row(k, 0.0);
                 information.fill_column(k, 0.0);
                 (gradient[k], information[(k, k)]) = (0.0, 1.0);
@@ -526,6 +530,11 @@ pub(super) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 impl Fit {
+    /// Whether the errors of an arm are among the unknowns.
+    pub fn has_arm(&self) -> bool {
+        self.random[FIELD_PARTS..].iter().any(|part| !part.is_empty())
+    }
+
     /// Unknowns.
     pub fn width(&self) -> usize {
         self.theta.len()

@@ -28,6 +28,8 @@ const MOST_TAKEN: usize = 12;
 /// Work after which no more is taken in, as [`Model::work`] counts it; a round of hypotheses beside each other may go a little
 /// beyond it, and that more is wrong is reported. One step of a fit of a hundred views with sixty unknowns is a 280th of it.
 const MOST_WORK: u64 = 100_000_000;
+/// The same of a model that has the errors of an arm, which is about twice as wide.
+const MOST_WORK_WITH_ARM: u64 = 3 * MOST_WORK;
 /// Views that are tested together at the most.
 const MOST_TOGETHER: usize = 40;
 
@@ -54,9 +56,11 @@ pub(super) fn select<'a>(
     arm: Option<&ArmFit>,
     work: &Work<'_>,
 ) -> Option<Selection<'a>> {
-    // Errors of an arm that is known say more than a field of what it does.
-    let places =
-        if arm.is_some() { None } else { Places::for_field(sight.views.iter().map(|view| &view.base_from_tip)) };
+    // The errors of an arm that is known leave nothing to a field, but where the joint estimate has one beside them.
+    let is_told_by_arm = arm.is_some_and(|arm| arm.beside.field.is_none());
+    let poses = sight.views.iter().map(|view| &view.base_from_tip);
+    let places = if is_told_by_arm { None } else { Places::for_field(poses) };
+    let most_work = if arm.is_some() { MOST_WORK_WITH_ARM } else { MOST_WORK };
     let mut model = Model::new(sight, start.solution, places, arm.map(KnownArm::from));
     let far: Vec<usize> = (0..sight.views.len()).filter(|i| start.misfit_m[*i] > FAR * start.median_m).collect();
     let most_aside = (MOST_ASIDE * sight.views.len() as f64) as usize;
@@ -97,7 +101,7 @@ pub(super) fn select<'a>(
             }
         }
         let best = best.filter(|_| taken.len() < MOST_TAKEN);
-        is_ended = best.is_some() && !taken.is_empty() && model.work() > MOST_WORK;
+        is_ended = best.is_some() && !taken.is_empty() && model.work() > most_work;
         let mut taken_now = None;
         for (i, j) in judged.into_iter().enumerate() {
             if Some(i) == best && !is_ended {
@@ -122,6 +126,18 @@ pub(super) fn select<'a>(
 }
 
 impl Selection<'_> {
+    /// Takes the size of the target from the estimate that has the errors of the arm beside it.
+    pub fn with_size_beside_arm(mut self, arm: &ArmFit) -> Self {
+        let Some((scale, sigma)) = arm.shape().and_then(|shape| Some((shape.shape.scale, shape.scale_sigma?))) else {
+            return self;
+        };
+        let is_scale = |j: &&mut Judged| j.candidate == Candidate::Effect(Effect::Scale);
+        for judged in self.taken.iter_mut().chain(&mut self.others).filter(is_scale) {
+            (judged.numbers, judged.sigma) = (vec![scale - 1.0], vec![sigma]);
+        }
+        self
+    }
+
     /// Takes the size of the target from the joint estimate, which has bend, field and lens beside it and every corner: poses
     /// measured by a flat board, and a size that is linear in them, are wrong about it where the board is bent. What that does
     /// not show stays in the model and is not reported.

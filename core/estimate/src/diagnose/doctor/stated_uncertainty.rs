@@ -71,14 +71,21 @@ pub(super) fn stated_uncertainty(selection: &Selection<'_>, calibration: &estima
 pub(super) fn with_own_lens(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
     let shared = calibration.shared_lens.as_ref().filter(|shared| shared.has_others());
     match shared {
-        Some(shared) => also(stated, shared.with_own_lens.clone()),
+        // It is relative to the answer by reported poses.
+        Some(shared) => match calibration.arm().zip(calibration.hand_eye.as_ref()) {
+            Some((arm, answer)) => {
+                let other_from_own = arm.hand_eye.mount_from_camera().inverse() * answer.mount_from_camera();
+                also(stated, shared.with_own_lens.seen_from(&other_from_own))
+            }
+            None => also(stated, shared.with_own_lens.clone()),
+        },
         None => stated,
     }
 }
 
 /// What may be stated where the robot's field leaves the size of the target open: a size that is off as prints and rulers are would
 /// go unnoticed, so the answer may be off by what the size that the data like best, drawn to the stated one, would move it. Where the
-/// errors of the arm are known they tell a size from an arm.
+/// errors of the arm are known they tell a size from an arm, but for one that is off by less than prints are.
 pub(super) fn with_open_size(stated: StatedUncertainty, calibration: &estimate::Fit) -> StatedUncertainty {
     let size = calibration.joint.as_ref().filter(|_| calibration.arm().is_none()).and_then(JointFit::open_size);
     match size {

@@ -7,8 +7,8 @@
 //! ([`Deviation`]), and whether it is good enough, which is also the case where it differs but says nearly as much.
 //!
 //! # Degenerate cases
-//! Whether the robot can get there is not known, but for an arm whose joints are recorded, of which poses are proposed that it gets
-//! to: a person skips what cannot be reached. The robot has to say where it is; a
+//! Whether the robot can get there is known only where its joints are recorded: then only poses that it reaches are proposed. Otherwise a
+//! person skips what cannot be reached. The robot has to say where it is; a
 //! session without robot poses has no hand-eye calibration.
 
 mod deviation;
@@ -181,7 +181,7 @@ impl HandGuide {
             camera_from_target: proposal.camera_from_target,
             why: None,
             views_left: None,
-            intrinsics: known.calibration?.intrinsics()?,
+            intrinsics: *self.guide.model(&known)?.intrinsics(),
             target: known.observations.target,
             worth: None,
         })
@@ -221,8 +221,13 @@ impl Wanted {
     fn says_as_much(&self, base_from_tip: &Pose<Base, Tip>) -> bool {
         let Some(Worth { model, design, reach, ratio }) = &self.worth else { return false };
         let all: Vec<usize> = (0..self.target.len()).collect();
-        let tip_from_joints = reach.as_ref().and_then(|reach| reach.tip_from_joints(base_from_tip));
-        let posture = Posture { base_from_tip: *base_from_tip, tip_from_joints: tip_from_joints.unwrap_or_default() };
+        let tip_from_joints = match reach.as_ref().map(|reach| reach.tip_from_joints(base_from_tip)) {
+            // What a view says depends on how the arm stands, and that is not known there.
+            Some(None) => return false,
+            Some(Some(tip_from_joints)) => tip_from_joints,
+            None => Vec::new(),
+        };
+        let posture = Posture { base_from_tip: *base_from_tip, tip_from_joints };
         let Some(view) = model.expected(&posture, &all) else { return false };
         let there = design.error_with_m(&view) / design.error_m();
         // Gains add up as logarithms.
