@@ -20,6 +20,7 @@ mod guided;
 mod real;
 mod session;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use handeye_estimate::handeye::Mode;
@@ -54,7 +55,7 @@ fn run() -> Result<(), Failure> {
     let what = arguments.first().ok_or("which CSV of arms, or which arm?")?;
     let views: usize = arguments.get(1).map_or(Ok(20), |text| text.parse())?;
     let asked = Asked { views, free_lens: given("lens"), guided: given("guided"), of_links: true };
-    if what.ends_with(".csv") {
+    if Path::new(what).extension().is_some_and(|ending| ending == "csv") {
         return of_file(what, asked, given("exact"), given("joints"));
     }
     let sessions = arguments.iter().find_map(|argument| argument.strip_prefix("sessions="));
@@ -62,13 +63,15 @@ fn run() -> Result<(), Failure> {
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| given(kind.name())).collect();
     let kinds = if kinds.is_empty() { Kind::ALL.to_vec() } else { kinds };
     if given("unknown") {
-        return of_unknown(what, asked, sessions, &kinds);
+        of_unknown(what, asked, sessions, &kinds);
+    } else {
+        of_drawn(what, asked, sessions, &kinds);
     }
-    of_drawn(what, asked, sessions, &kinds)
+    Ok(())
 }
 
 /// Arms of which the program is not told what they are.
-fn of_unknown(name: &str, asked: Asked, count: u64, kinds: &[Kind]) -> Result<(), Failure> {
+fn of_unknown(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
         println!(
             "\n{name}, chain not known, {set_up}, {} views\n\n| kind | sessions | from that of many views mm | from the true one mm | stated mm | within | within of the true one |\n| --- | --- | --- | --- | --- | --- | --- |",
@@ -88,15 +91,14 @@ fn of_unknown(name: &str, asked: Asked, count: u64, kinds: &[Kind]) -> Result<()
                 "| {} | {} | {:.3} | {:.3} | {:.3} | {} | {} |",
                 kind.name(),
                 sessions.len(),
-                middle(&|s| s.from_reported_mm),
-                middle(&|s| s.from_truth_mm),
-                middle(&|s| s.stated_mm),
-                sessions.iter().filter(|s| s.from_reported_mm <= s.stated_mm).count(),
-                sessions.iter().filter(|s| s.from_truth_mm <= s.stated_mm).count(),
+                middle(&|s| s.from_reported),
+                middle(&|s| s.from_truth),
+                middle(&|s| s.stated),
+                sessions.iter().filter(|s| s.from_reported <= s.stated).count(),
+                sessions.iter().filter(|s| s.from_truth <= s.stated).count(),
             );
         }
     }
-    Ok(())
 }
 
 /// Arms of a file, one line each.
@@ -140,7 +142,7 @@ fn of_file(path: &str, asked: Asked, exact: bool, joints: bool) -> Result<(), Fa
 }
 
 /// Arms with errors of each kind, a line a kind.
-fn of_drawn(name: &str, asked: Asked, count: u64, kinds: &[Kind]) -> Result<(), Failure> {
+fn of_drawn(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
         println!(
             "\n{name}, {set_up}, {} views, lens {}\n\n{HEADER}",
@@ -155,7 +157,7 @@ fn of_drawn(name: &str, asked: Asked, count: u64, kinds: &[Kind]) -> Result<(), 
                 session(&cell, Asked { of_links: kind.is_of_links(), ..asked }, 1000 + seed)
             };
             let sessions: Vec<Result<Touched, Failure>> = (0..count).into_par_iter().map(one).collect();
-            let failed = sessions.iter().filter_map(|session| session.as_ref().err()).next().map(ToString::to_string);
+            let failed = sessions.iter().find_map(|session| session.as_ref().err()).map(ToString::to_string);
             let sessions: Vec<Touched> = sessions.into_iter().filter_map(Result::ok).collect();
             row(kind.name(), &sessions);
             if let Some(failed) = failed {
@@ -163,7 +165,6 @@ fn of_drawn(name: &str, asked: Asked, count: u64, kinds: &[Kind]) -> Result<(), 
             }
         }
     }
-    Ok(())
 }
 
 const HEADER: &str = "| kind | sessions | Park mm | as it is mm | corrected mm | worse | stated 95 % mm | touches within | sessions within, corrected | in space mm | stated | within |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |";

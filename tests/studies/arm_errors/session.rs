@@ -133,9 +133,9 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
 /// What a transform is off by where the chain is not known: from that of so many views that it is the one that goes with the poses
 /// which this arm reports, and from the true one, millimetres at the board; and what is stated.
 pub struct Unknown {
-    pub from_reported_mm: f64,
-    pub from_truth_mm: f64,
-    pub stated_mm: f64,
+    pub from_reported: f64,
+    pub from_truth: f64,
+    pub stated: f64,
 }
 
 const VERY_MANY: usize = 300;
@@ -159,9 +159,9 @@ pub fn unknown(cell: &Cell, asked: Asked, seed: u64) -> Result<Unknown, Failure>
     let truth =
         if of_links { true_mount_from_camera(cell, &placed.arm, &mut ChaCha8Rng::seed_from_u64(1)) } else { None };
     Ok(Unknown {
-        from_reported_mm: (at(&found) - at(&many)).norm() * 1e3,
-        from_truth_mm: truth.map_or(f64::NAN, |truth| (at(&found) - truth * board).norm() * 1e3),
-        stated_mm: calibration.tip_error_95_m().map_or(f64::NAN, |m| m * 1e3),
+        from_reported: (at(&found) - at(&many)).norm() * 1e3,
+        from_truth: truth.map_or(f64::NAN, |truth| (at(&found) - truth * board).norm() * 1e3),
+        stated: calibration.tip_error_95_m().map_or(f64::NAN, |m| m * 1e3),
     })
 }
 
