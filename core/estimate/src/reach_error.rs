@@ -33,7 +33,7 @@ use handeye_geometry::se3;
 use handeye_geometry::targets::TargetSpec;
 
 /// Touches of a session. The error of commands as they are is almost the same in every draw, so that its quantile is one over the
-/// touches, which is too small over a few: by 3 % of the probability with 24 of them, by 1 % with these.
+/// touches, which is too small over a few: of 24 the 23rd has 23 of 25 below it in the mean, of these the 92nd has 92 of 97.
 const TOUCHES: usize = 96;
 /// Draws of arm and camera.
 const DRAWS: usize = 100;

@@ -61,9 +61,9 @@ impl Alternative {
         }
     }
 
-    /// The same from another answer.
-    pub(crate) fn seen_from(&self, other_from_own: &Pose<Camera, Camera>) -> Self {
-        let shift = se3::log(&(other_from_own.isometry() * se3::exp(&self.shift)));
+    /// The same for the answer `other` where this is for the answer `own`.
+    pub(crate) fn of_another(&self, own: &Pose<Mount, Camera>, other: &Pose<Mount, Camera>) -> Self {
+        let shift = se3::log(&((other.inverse() * *own).isometry() * se3::exp(&self.shift)));
         Self { shift, covariance: self.covariance }
     }
 
@@ -78,8 +78,7 @@ impl StatedUncertainty {
     #[must_use]
     pub(crate) fn of_another(&self, own: &Pose<Mount, Camera>, other: &Pose<Mount, Camera>) -> Self {
         let Self::Moved(alternatives) = self else { return self.clone() };
-        let other_from_own = other.inverse() * *own;
-        Self::Moved(alternatives.iter().map(|alternative| alternative.seen_from(&other_from_own)).collect())
+        Self::Moved(alternatives.iter().map(|alternative| alternative.of_another(own, other)).collect())
     }
 
     /// How far explanations that the answer does not count on would move a `point` (camera coordinates, metres), metres;

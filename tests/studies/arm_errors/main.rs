@@ -70,6 +70,13 @@ fn run() -> Result<(), Failure> {
     Ok(())
 }
 
+/// A cell with an arm whose errors are drawn.
+fn drawn(name: &str, kind: Kind, mode: Mode, seed: u64) -> Result<Cell, Failure> {
+    let model = model(name)?;
+    let real = Real::draw(kind, &model, &mut ChaCha8Rng::seed_from_u64(seed));
+    Ok(Cell::new(name, model, real, kind.repeats(), mode))
+}
+
 /// Arms of which the program is not told what they are.
 fn of_unknown(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
@@ -79,9 +86,7 @@ fn of_unknown(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
         );
         for kind in kinds {
             let one = |seed: u64| {
-                let model = model(name)?;
-                let real = Real::draw(*kind, &model, &mut ChaCha8Rng::seed_from_u64(seed));
-                let cell = Cell::new(name, model, real, kind.repeats(), mode);
+                let cell = drawn(name, *kind, mode, seed)?;
                 unknown(&cell, Asked { of_links: kind.is_of_links(), ..asked }, 1000 + seed)
             };
             let sessions: Vec<Result<Unknown, Failure>> = (0..count).into_par_iter().map(one).collect();
@@ -151,9 +156,7 @@ fn of_drawn(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
         );
         for kind in kinds {
             let one = |seed: u64| {
-                let model = model(name)?;
-                let real = Real::draw(*kind, &model, &mut ChaCha8Rng::seed_from_u64(seed));
-                let cell = Cell::new(name, model, real, kind.repeats(), mode);
+                let cell = drawn(name, *kind, mode, seed)?;
                 session(&cell, Asked { of_links: kind.is_of_links(), ..asked }, 1000 + seed)
             };
             let sessions: Vec<Result<Touched, Failure>> = (0..count).into_par_iter().map(one).collect();

@@ -269,8 +269,8 @@ fn report(calibration: &Calibration, arm: &ArmFit) {
         println!("  {:?} {:?}: {:?}", finding.severity, finding.code, finding.evidence);
     }
     println!(
-        "{:?} moved {:?} robot {:.4} mm {:.4}° → {:.4} mm {:.4}°; levels {:.4}° {:.4} mm {:.4}°; held out {:?}; contradicted {}, size {:?}",
-        cell_of(calibration),
+        "corrected within {:?} m, moved {:?} mm, robot {:.4} mm {:.4}° → {:.4} mm {:.4}°; levels {:.4}° {:.4} mm {:.4}°; held out {:?}; contradicted {}, size {:?}",
+        calibration.reach_errors().and_then(|reach| reach.corrected_95_m),
         moved_mm(calibration),
         calibration.joint.as_ref().map_or(0.0, |joint| joint.noise.robot_m * 1e3),
         calibration.joint.as_ref().map_or(0.0, |joint| joint.noise.robot_rad.to_degrees()),
@@ -283,10 +283,6 @@ fn report(calibration: &Calibration, arm: &ArmFit) {
         arm.contradicted,
         arm.shape().and_then(|shape| Some((shape.shape.scale, shape.scale_sigma?)))
     );
-}
-
-fn cell_of(calibration: &Calibration) -> Option<f64> {
-    calibration.reach_errors().and_then(|reach| reach.corrected_95_m)
 }
 
 fn moved_mm(calibration: &Calibration) -> Option<f64> {

@@ -137,6 +137,21 @@ fn the_error_is_told_against_the_truth_of_the_simulator_and_only_where_there_is_
 }
 
 #[test]
+fn what_the_calibration_is_off_by_is_told_beside_the_noise() {
+    let says = |answer: Model, mm: &str| {
+        let mut model = tracked();
+        model.solve = answer.solve;
+        driven(model).sees(mm)
+    };
+    assert!(says(sample::with_errors_of_the_arm(), "alone: a tool arrives within 2.91 mm (95 %)."), "as it is tracked");
+    assert!(says(sample::connected(), "the error of the calibration is not known."));
+    let answer = sample::solved();
+    let solved = answer.solve.current().expect("solved");
+    let point_mm = solved.result.quality.tip_error_95_mm.expect("stated");
+    assert!(says(answer, &format!("the calibration puts a point within {point_mm:.2} mm (95 %).")));
+}
+
+#[test]
 fn where_the_errors_of_the_arm_are_known_a_person_chooses_whether_they_are_corrected() {
     const SWITCH: &str = "Correct for the errors of the arm";
     let mut model = tracked();

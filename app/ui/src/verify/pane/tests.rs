@@ -151,6 +151,7 @@ fn where_the_errors_of_the_arm_are_known_predictions_and_points_are_also_by_corr
     let pane = driven(worse);
     assert!(pane.sees("As reported:") && pane.sees("Corrected tip poses do not have them: they are those of the arm"));
     assert!(!pane.sees("The board may have been moved"));
+    assert!(pane.nothing_is_cut_off());
     let solved = model.solve.solved.as_ref().expect("solved");
     let reported = solved.verification.as_ref().and_then(|it| it.as_ref().ok()).expect("verified").centre_rms_m;
     let pane = driven(model.clone());

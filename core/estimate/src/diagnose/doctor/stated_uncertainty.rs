@@ -9,6 +9,7 @@ use super::model::{Fit, State};
 use super::screen::Candidate;
 use super::select::Selection;
 use crate::diagnose::findings::FindingCode;
+use crate::handeye::HandEye;
 use crate::stated_uncertainty::{Alternative, StatedUncertainty};
 use crate::{self as estimate, JointFit, ViewStatus};
 use handeye_geometry::frames::{Camera, Mount, Pose};
@@ -74,8 +75,8 @@ pub(super) fn with_own_lens(stated: StatedUncertainty, calibration: &estimate::F
         // It is relative to the answer by reported poses.
         Some(shared) => match calibration.arm().zip(calibration.hand_eye.as_ref()) {
             Some((arm, answer)) => {
-                let other_from_own = arm.hand_eye.mount_from_camera().inverse() * answer.mount_from_camera();
-                also(stated, shared.with_own_lens.seen_from(&other_from_own))
+                let [own, other] = [answer, &arm.hand_eye].map(HandEye::mount_from_camera);
+                also(stated, shared.with_own_lens.of_another(&own, &other))
             }
             None => also(stated, shared.with_own_lens.clone()),
         },

@@ -205,7 +205,8 @@ impl Wanted {
     }
 
     /// Compares with the view that there is, by the corners found in it and where the robot says that it is. A tenth of a
-    /// millisecond in a release build (`guided_capture -- speed`), so it may be asked for every image.
+    /// millisecond in a release build where the joints are not known (`guided_capture -- speed`), and one inverse kinematics more where they
+    /// are: it may be asked for every image.
     pub fn judge(&self, corners: &[Corner], base_from_tip: &Pose<Base, Tip>) -> Judged {
         // By the lens that the wanted view is drawn by: one that is wrong yet looks right is the same view.
         let present = planar_pose::camera_from_target(corners, &self.target, &self.intrinsics).ok();

@@ -149,4 +149,5 @@ fn an_arm_whose_joints_are_recorded_is_planned_by_its_errors_though_nobody_drive
     assert!(!wanted.judge(&far, &cell.base_from_tip()).is_good);
     let nowhere = Pose::from_isometry(nalgebra::Isometry3::translation(9.0, 0.0, 0.0));
     assert_eq!(reach.tip_from_joints(&nowhere), None);
+    assert!(!wanted.says_as_much(&nowhere), "how the arm would stand is not known");
 }
