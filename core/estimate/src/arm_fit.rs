@@ -5,13 +5,13 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::ShapeEstimate;
 use crate::handeye::joint::{
-    self, ArmErrors, Free, JointProblem, JointSolution, Noise, PoseDependentError, SIZE_SIGMA, SmallSample,
+    self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample, with_shown_field,
 };
 use crate::handeye::{HandEye, HandEyeError, determined};
 use crate::resolution;
 use crate::size::LEAST_SCALE;
 use crate::stated_uncertainty::Alternative;
-use crate::uncertainty::quality;
+use crate::uncertainty::quality::{self, PredictedBy};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::progress::Work;
 use handeye_geometry::se3;
@@ -34,7 +34,7 @@ pub struct ArmFit {
     pub small_sample: SmallSample,
     /// Noise levels, those of the arm's errors among them; what of the robot remains is what its links do not explain.
     pub noise: Noise,
-    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses and by corrected ones; `None` with too few views.
+    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses as they are and by corrected ones; `None` with too few views.
     pub heldout_px: Option<[f64; 2]>,
     /// Whether views left out contradict the errors: they are predicted worse by corrected poses than by reported ones, by more than
     /// chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected poses,
@@ -49,8 +49,6 @@ pub struct BesideArm {
     pub intrinsics: Intrinsics,
     /// Shape of the target, estimated or as given.
     pub shape: BoardShape,
-    /// Errors that depend on where the robot stands and that its arm does not explain; `None` when they were not estimated.
-    pub field: Option<PoseDependentError>,
     /// Errors of the depths; none where they were not estimated.
     pub depth: DepthBias,
     /// What of all that was free.
@@ -62,7 +60,7 @@ pub struct BesideArm {
 const SIZE_GAIN: f64 = 6.63;
 
 impl ArmFit {
-    /// Covariance of the errors, in the order of [`arm_parameters`](joint::arm_parameters).
+    /// Covariance of the errors, in the order of [`ArmErrors::numbers`].
     pub fn errors_covariance(&self) -> DMatrix<f64> {
         let (count, first) = self.error_places();
         self.covariance.view((first, first), (count, count)).into_owned()
@@ -78,13 +76,15 @@ impl ArmFit {
 
     /// How many errors there are, and where they begin in the covariance.
     fn error_places(&self) -> (usize, usize) {
-        let count = self.errors.values().len();
+        let count = self.errors.number_count();
         (count, self.covariance.nrows() - count)
     }
 
-    /// Standard deviations of the errors, in the order of [`arm_parameters`](joint::arm_parameters).
+    /// Standard deviations of the errors of links and joints, in the order of [`arm_parameters`](joint::arm_parameters).
     pub fn sigma(&self) -> Vec<f64> {
-        self.errors_covariance().diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect()
+        (self.covariance.nrows() - self.errors.values().len()..self.covariance.nrows())
+            .map(|i| self.deviation(i))
+            .collect()
     }
 
     /// Standard deviations of the lens that goes with them, in the order of [`Intrinsics::parameters`]; empty when it was given.
@@ -152,15 +152,19 @@ pub(crate) fn arm_fit(
     solution: &JointSolution,
     work: &Work<'_>,
 ) -> Result<Option<ArmFit>, HandEyeError> {
-    let with = JointProblem { free: Free { arm: true, ..problem.free }, ..*problem };
+    let with = JointProblem { free: Free { arm: true, field: false, ..problem.free }, ..*problem };
     if with.arm().is_none() || problem.noise.is_some() {
         return Ok(None);
     }
     let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
     let (with, fit) = with_shown_size(&with, fit, work)?;
+    let (with, fit) = match with_shown_field(&with, with.views, &fit, *work)? {
+        Some(with_field) => (JointProblem { free: with_field.free, ..with }, with_field),
+        None => (with, fit),
+    };
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
-    let heldout = quality::compared((problem, solution), (&with, &fit), work.cancel)?;
+    let heldout = quality::compared((problem, solution), (&with, &fit), PredictedBy::Links, work.cancel)?;
     let contradicted = match heldout.filter(|heldout| heldout.is_worse) {
         None => false,
         Some(heldout) => {
@@ -171,13 +175,7 @@ pub(crate) fn arm_fit(
             })
         }
     };
-    let beside = BesideArm {
-        intrinsics: fit.intrinsics,
-        shape: fit.shape,
-        field: fit.field.clone(),
-        depth: fit.depth,
-        free: fit.free,
-    };
+    let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, depth: fit.depth, free: fit.free };
     Ok(Some(ArmFit {
         errors,
         hand_eye: fit.hand_eye,

@@ -82,6 +82,20 @@ fn the_error_of_a_camera_on_an_arm_counts_what_the_arm_is_off_and_more_views_are
 }
 
 #[test]
+fn what_changes_with_the_place_and_is_no_error_of_a_link_is_corrected_too() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let exact = with(mode, ArmError::None, 5);
+        let noise = Noise { field_m: 1e-3, field_rad: 1e-3, ..exact.noise };
+        let (arm, [reported, corrected]) = predicted(&Setup { noise, ..exact }, 20);
+        println!("{mode:?}: {reported:.3} → {corrected:.3} px, levels {:?}", arm.noise);
+        assert!(arm.errors.field().is_some(), "{mode:?}");
+        assert!(corrected < 0.5 * reported && !arm.contradicted, "{mode:?}: {reported} → {corrected} px");
+        let (of_links, _) = predicted(&with(mode, ArmError::Links(OFF_LINKS), 5), 20);
+        assert!(of_links.errors.field().is_none(), "{mode:?}: links explain all that they do");
+    }
+}
+
+#[test]
 fn an_exact_arm_is_left_as_it_is() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
         let (arm, [reported, corrected]) = predicted(&with(mode, ArmError::None, 6), 20);

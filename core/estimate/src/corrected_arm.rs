@@ -21,7 +21,7 @@ pub struct CorrectedArm {
     pub arm: Arm,
     /// What it is off.
     pub errors: ArmErrors,
-    /// Covariance of the errors, in the order of [`arm_parameters`](crate::handeye::joint::arm_parameters).
+    /// Covariance of the errors, in the order of [`ArmErrors::numbers`].
     pub covariance: DMatrix<f64>,
     /// What they do not explain, standard deviations of the tip's position \[m\] and orientation \[rad\] per axis.
     pub unexplained: (f64, f64),
@@ -98,7 +98,7 @@ impl CorrectedArm {
     }
 
     /// The chain with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what the joints give way
-    /// by under gravity, which no fixed chain has.
+    /// by under gravity and for the field, which no fixed chain has.
     ///
     /// # Errors
     /// [`ArmError`] where the errors are no errors of an arm.

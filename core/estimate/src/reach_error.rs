@@ -254,7 +254,7 @@ impl Reach {
 
     /// How the miss of a touch by corrected commands turns with what is not known: the mean over touches of `Jᵀ J`, with `J` the
     /// derivatives of the vector from the point to the tip of the tool by `[mount_from_camera (6), errors of the arm]`, metres and
-    /// radians. Of touches at the target, or at points in camera coordinates. `None` where too few touches are in reach.
+    /// radians, the errors in the order of [`ArmErrors::numbers`]. Of touches at the target, or at points in camera coordinates. `None` where too few touches are in reach.
     pub fn weight(&self, in_camera: Option<&[Point3<f64>]>) -> Option<DMatrix<f64>> {
         let target = self.target.points();
         if in_camera.map_or(target.is_empty(), <[Point3<f64>]>::is_empty) {
@@ -278,7 +278,7 @@ impl Reach {
             });
             Some(DVector::from_iterator(3 * touches.len(), each))
         };
-        let (at_best, arm) = (misses(&best)?, best.errors.values().len());
+        let (at_best, arm) = (misses(&best)?, best.errors.number_count());
         let columns: Option<Vec<DVector<f64>>> = (0..6 + arm)
             .map(|k| {
                 let mut there = best.clone();
@@ -288,7 +288,7 @@ impl Reach {
                     let (mount, anchor) = (there.hand_eye.mount_from_camera(), there.hand_eye.anchor_from_target());
                     there.hand_eye = HandEye::new(there.hand_eye.mode(), mount.perturbed(&step), anchor);
                 } else {
-                    there.errors.values_mut()[k - 6] += STEP;
+                    *there.errors.numbers_mut().nth(k - 6)? += STEP;
                 }
                 Some((misses(&there)? - &at_best) / STEP)
             })
@@ -457,9 +457,10 @@ fn possible(fit: &ArmFit, random: &mut Draw) -> Option<Vec<Possible>> {
         let step = &root * DVector::from_fn(count, |_, _| random.normal());
         let step = step * (freedom / law.inverse_cdf(random.even())).sqrt();
         let perturb = |at: usize| -> Vector6<f64> { step.fixed_rows::<6>(at).into_owned() };
-        let values = fit.errors.values().iter().zip(step.rows(12, count - 12).iter()).map(|(a, b)| a + b).collect();
+        let mut errors = fit.errors.clone();
+        errors.numbers_mut().zip(step.rows(12, count - 12).iter()).for_each(|(number, step)| *number += step);
         drawn.push(Possible {
-            errors: ArmErrors::new(fit.errors.joint_count(), values)?,
+            errors,
             hand_eye: HandEye::new(
                 fit.hand_eye.mode(),
                 fit.hand_eye.mount_from_camera().perturbed(&perturb(0)),

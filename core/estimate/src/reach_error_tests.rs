@@ -85,12 +85,12 @@ fn the_weight_says_how_far_small_errors_move_a_touch() {
         let (session, found, seen) = solved(mode, ArmError::None);
         let reach = reach(&session, &found, &seen).expect("an arm in reach");
         let weight = reach.weight(None).expect("in reach");
-        let arm = reach.repeated[0].errors.values().len();
+        let arm = reach.repeated[0].errors.number_count();
         // Half a millimetre here, some hundredths of a degree there.
         let step = DVector::from_fn(6 + arm, |k, _| 3e-4 * (1.3 * k as f64 + 1.0).sin());
         let expected_m = (step.transpose() * &weight * &step)[(0, 0)].sqrt();
         let mut truth = Possible { unexplained: Unexplained::nothing(), ..reach.repeated[0].clone() };
-        truth.errors.values_mut().iter_mut().zip(step.rows(6, arm).iter()).for_each(|(value, step)| *value += step);
+        truth.errors.numbers_mut().zip(step.rows(6, arm).iter()).for_each(|(value, step)| *value += step);
         let mount = truth.hand_eye.mount_from_camera().perturbed(&step.fixed_rows::<6>(0).into_owned());
         truth.hand_eye = HandEye::new(mode, mount, truth.hand_eye.anchor_from_target());
         let target = session.target.points();

@@ -19,8 +19,9 @@ use crate::handeye::joint::{
 use crate::handeye::numbering::Turns;
 use crate::handeye::{HandEyeError, PosePair, determined};
 use crate::residuals::squared_residuals;
+use crate::uncertainty::overdispersion;
 use crate::uncertainty::overdispersion::Overdispersion;
-use crate::uncertainty::{overdispersion, quality};
+use crate::uncertainty::quality::{self, PredictedBy};
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::progress::Work;
 use handeye_geometry::targets::TargetSpec;
@@ -288,7 +289,8 @@ fn depths(
     let Some(found) = with_depths(&without, &screened.solution, work.cancel)? else { return Ok(None) };
     let free = found.solution.free;
     let with = JointProblem { free, depth: Some(found.weight), ..without };
-    let compared = quality::compared((&without, &screened.solution), (&with, &found.solution), work.cancel)?;
+    let compared =
+        quality::compared((&without, &screened.solution), (&with, &found.solution), PredictedBy::Model, work.cancel)?;
     let Some(heldout) = compared else { return Ok(None) };
     let accepted = !heldout.is_worse;
     let depths = DepthsInFit {

@@ -4,11 +4,11 @@ use nalgebra::{DMatrix, Matrix6};
 use serde::{Deserialize, Serialize};
 
 use super::check::{BadResult, Checked, all_finite, not_negative, require};
-use super::{BoardEstimate, IntrinsicsEstimate, TransformEstimate};
+use super::{BoardEstimate, IntrinsicsEstimate, PoseDependentErrorEstimate, TransformEstimate};
 use handeye_arm::Arm;
 use handeye_estimate::ArmFit;
 use handeye_estimate::corrected_arm::CorrectedArm;
-use handeye_estimate::handeye::joint::{ArmErrors, LinkError, SmallSample, arm_parameters};
+use handeye_estimate::handeye::joint::{ArmErrors, LinkError, PoseDependentError, SmallSample, arm_parameters};
 use handeye_estimate::reach_error::USUAL_TOOL_M;
 
 /// The errors of the robot's arm as the images show them, and the transforms that go with corrected poses.
@@ -36,8 +36,13 @@ pub struct ArmEstimate {
     /// The target's shape that goes with them, where it was estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardEstimate>,
+    /// Errors that depend on where the tip stands and that joints and links do not explain, where the data show them: of the pose by the
+    /// chain with its errors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<PoseDependentErrorEstimate>,
     /// Covariance of the errors, radians and metres: for the joints in their order all `tilt` (x, y) and `zero`, then all `shift`
-    /// (x, y), then all `compliance`; what is null in `joints` is left out.
+    /// (x, y), then all `compliance`; what is null in `joints` is left out. Where there is a `field`, then its slopes by columns: all of
+    /// the position (tip, base), then all of the orientation.
     pub covariance: Vec<Vec<f64>>,
     /// As in [`EstimateDetails`](super::EstimateDetails).
     pub degrees_of_freedom: Option<f64>,
@@ -142,6 +147,15 @@ fn shown_per_unit(error: LinkError) -> f64 {
     }
 }
 
+/// The covariance of errors in the order and the units of the document: slopes last and per metre.
+fn of_document(errors: &ArmErrors, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let (count, unit_m) = (errors.number_count(), errors.field().map_or(1.0, PoseDependentError::unit_m));
+    let slopes = errors.slope_count();
+    let number = |k: usize| (k + slopes) % count;
+    let per_unit = |k: usize| if k + slopes < count { 1.0 } else { unit_m.recip() };
+    DMatrix::from_fn(count, count, |i, j| covariance[(number(i), number(j))] * per_unit(i) * per_unit(j))
+}
+
 impl ArmEstimate {
     /// Of a fit of the errors of an arm; `None` where that is an arm with another number of joints.
     pub fn new(chain: &Arm, fit: &ArmFit, tool_m: [f64; 3]) -> Option<Self> {
@@ -158,7 +172,8 @@ impl ArmEstimate {
         }
         let block = |at: usize| -> Matrix6<f64> { fit.covariance.fixed_view::<6, 6>(at, at).into_owned() };
         let (hand_eye, target) = TransformEstimate::of_links(&fit.hand_eye, Some(&block(0)), Some(&block(6)));
-        let of_errors = fit.errors_covariance();
+        let of_errors = of_document(&fit.errors, &fit.errors_covariance());
+        let corrected_px = fit.heldout_px.map(|[_, corrected]| corrected);
         let lens_sigma = fit.intrinsics_sigma();
         let sigma = lens_sigma.first_chunk().copied();
         let intrinsics = IntrinsicsEstimate::new(&fit.beside.intrinsics, sigma, lens_sigma.is_empty());
@@ -179,6 +194,7 @@ impl ArmEstimate {
             target,
             intrinsics: Some(intrinsics),
             board: fit.shape().map(BoardEstimate::from),
+            field: fit.errors.field().map(|it| PoseDependentErrorEstimate::new(it, &fit.noise, corrected_px)),
             covariance: of_errors.row_iter().map(|row| row.iter().copied().collect()).collect(),
             degrees_of_freedom: Some(fit.small_sample.degrees_of_freedom).filter(|value| value.is_finite()),
             region_scale: fit.small_sample.scale,
@@ -198,12 +214,14 @@ impl ArmEstimate {
             value_of(&self.joints[parameter.joint], parameter.error).unwrap_or(0.0) / shown_per_unit(parameter.error)
         });
         let errors = ArmErrors::new(self.chain.joint_count(), values.collect())
-            .ok_or(BadResult { at: "arm.joints".to_owned(), problem: "are not those of the chain" })?;
-        let count = parameters.len();
+            .ok_or(BadResult { at: "arm.joints".to_owned(), problem: "are not those of the chain" })?
+            .with_field(self.field.as_ref().map(PoseDependentErrorEstimate::field));
+        let (count, slopes) = (errors.number_count(), errors.slope_count());
+        let place = |k: usize| (k + count - slopes) % count;
         Ok(CorrectedArm {
             arm: self.chain.clone(),
             errors,
-            covariance: DMatrix::from_fn(count, count, |i, j| self.covariance[i][j]),
+            covariance: DMatrix::from_fn(count, count, |i, j| self.covariance[place(i)][place(j)]),
             unexplained: (self.unexplained.translation_mm * 1e-3, self.unexplained.rotation_deg.to_radians()),
             small_sample: SmallSample {
                 degrees_of_freedom: self.degrees_of_freedom.unwrap_or(SmallSample::KNOWN.degrees_of_freedom),
@@ -223,8 +241,10 @@ impl ArmEstimate {
             let value = value_of(&self.joints[parameter.joint], parameter.error);
             require(value.is_some_and(f64::is_finite), "arm.joints", "must have a number for all but the first joint")?;
         }
-        let is_square = self.covariance.iter().all(|row| row.len() == parameters.len());
-        require(self.covariance.len() == parameters.len() && is_square, "arm.covariance", "is of another arm")?;
+        self.field.as_ref().map_or(Ok(()), |field| field.check("arm.field"))?;
+        let count = parameters.len() + self.field.as_ref().map_or(0, |field| field.field().slopes().len());
+        let is_square = self.covariance.iter().all(|row| row.len() == count);
+        require(self.covariance.len() == count && is_square, "arm.covariance", "is of another arm")?;
         for row in &self.covariance {
             all_finite(row, "arm.covariance")?;
         }
@@ -246,7 +266,30 @@ impl ArmEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::golden_arm;
+    use crate::testing::{golden_arm, golden_arm_with_a_field};
+
+    #[test]
+    fn an_arm_with_a_field_comes_back_with_the_same_tip_and_the_same_uncertainty() {
+        let (chain, fit) = golden_arm_with_a_field();
+        let estimate = ArmEstimate::new(&chain, &fit, usual_tool()).expect("six joints");
+        assert!((estimate.covariance[0][0] - fit.sigma()[0].powi(2)).abs() < 1e-20, "joints come first");
+        let text = serde_json::to_string(&estimate).expect("plain data");
+        let read: ArmEstimate = serde_json::from_str(&text).expect("the same");
+        let (here, there) =
+            (CorrectedArm::new(chain, &fit).expect("six joints"), read.corrected_arm().expect("of an arm"));
+        let without = CorrectedArm { errors: here.errors.clone().with_field(None), ..here.clone() };
+        for joints in [[0.1, -1.2, 1.4, -1.8, -1.6, 0.2], [0.6, -1.5, 1.1, -1.2, -1.3, -0.4]] {
+            let tip = here.actual(&joints).expect("six");
+            let (m, rad) = tip.distance_to(&there.actual(&joints).expect("six"));
+            assert!(m < 1e-12 && rad < 1e-7, "{m} m, {rad} rad");
+            assert!(tip.distance_to(&without.actual(&joints).expect("six")).0 > 1e-5, "the field moves it");
+            let (a, b) = (here.error_95_m(&joints).expect("six"), there.error_95_m(&joints).expect("six"));
+            assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+        }
+        let mut other = estimate;
+        other.field = None;
+        assert_eq!(other.corrected_arm().expect_err("of more numbers").at, "arm.covariance");
+    }
 
     #[test]
     fn an_arm_comes_back_from_its_document_with_the_same_errors() {
@@ -264,7 +307,7 @@ mod tests {
         for (a, b) in here.errors.values().iter().zip(there.errors.values()) {
             assert!((a - b).abs() < 1e-15, "{a} {b}");
         }
-        assert_eq!(here.covariance, there.covariance);
+        assert!((&here.covariance - &there.covariance).amax() < 1e-20);
         let lens = read.intrinsics.as_ref().and_then(IntrinsicsEstimate::intrinsics);
         assert_eq!(lens, Some(fit.beside.intrinsics), "the lens that goes with its hand-eye");
         let joints = [0.1, -1.2, 1.4, -1.8, -1.6, 0.2];

@@ -167,11 +167,7 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
         not_negative(Some(size.sigma), "estimate.target_size.sigma")?;
     }
     if let Some(field) = &estimate.robot_field {
-        all_finite(&field.origin_m, "estimate.robot_field.origin_m")?;
-        require(field.reach_m > 0.0, "estimate.robot_field.reach_m", "must be a positive length")?;
-        all_finite(field.position_slopes.as_flattened(), "estimate.robot_field.position_slopes")?;
-        let orientation = field.orientation_slopes_rad_per_m.as_flattened();
-        all_finite(orientation, "estimate.robot_field.orientation_slopes_rad_per_m")?;
+        field.check("estimate.robot_field")?;
     }
     if let Some(print) = &estimate.print {
         let PrintEstimate { rms_mm, x_mm, y_mm, sigma_mm } = print;

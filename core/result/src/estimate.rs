@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
+use super::check::{Checked, all_finite, require};
 use handeye_estimate::diagnose::record::FindingRecord;
-use handeye_estimate::handeye::joint::PoseDependentError;
+use handeye_estimate::handeye::joint::{Noise, PoseDependentError, Slopes};
 
 /// Details of a joint estimate. Of a camera alone there are the target as found, and degrees of freedom and widening of the
 /// standard deviations of its intrinsics.
@@ -129,19 +130,26 @@ pub struct DepthsEstimate {
 /// Errors of the robot as an affine function of where its tip is: an optional correction of reported poses.
 ///
 /// With `p` the reported tip position in the base, the true tip pose is `base_from_tip * E`: `E` has the translation
-/// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in
-/// radians, both in the axes of the tip. Where `p` is farther from the origin than `reach_m` nothing is known, and
-/// `p - origin_m` is shortened to that length.
+/// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in radians, both in
+/// the axes of the tip; those in the axes of the base, with the reported rotation `R`, add `Rᵀ position_slopes_in_base (p - origin_m)`
+/// and likewise. Where `p` is farther from the
+/// origin than `reach_m` nothing is known, and `p - origin_m` is shortened to that length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PoseDependentErrorEstimate {
     /// Where the field is zero, in the base, metres: the middle of the session's tip positions.
     pub origin_m: [f64; 3],
     /// How far from there the session went, metres.
     pub reach_m: f64,
-    /// Metres of error per metre, by rows.
+    /// Metres of error in the axes of the tip per metre, by rows.
     pub position_slopes: [[f64; 3]; 3],
-    /// Radians of error per metre, by rows.
+    /// Radians of error in the axes of the tip per metre, by rows.
     pub orientation_slopes_rad_per_m: [[f64; 3]; 3],
+    /// Metres of error in the axes of the base per metre, by rows; beside the errors of an arm alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_slopes_in_base: Option<[[f64; 3]; 3]>,
+    /// Radians of error in the axes of the base per metre, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation_slopes_in_base_rad_per_m: Option<[[f64; 3]; 3]>,
     /// Estimated standard deviation of the error of position per axis, at the RMS distance of the session's tip positions
     /// from the origin, millimetres.
     pub typical_mm: f64,
@@ -152,11 +160,44 @@ pub struct PoseDependentErrorEstimate {
 }
 
 impl PoseDependentErrorEstimate {
+    /// Of a field at these noise levels.
+    pub(super) fn new(field: &PoseDependentError, noise: &Noise, heldout_rms_px: Option<f64>) -> Self {
+        let rows = |m: &Matrix3<f64>| [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]);
+        let (in_tip, in_base) = (field.in_tip(), field.in_base());
+        Self {
+            origin_m: field.origin_m().into(),
+            reach_m: field.reach_m(),
+            position_slopes: rows(&in_tip.position),
+            orientation_slopes_rad_per_m: rows(&in_tip.orientation),
+            position_slopes_in_base: in_base.map(|slopes| rows(&slopes.position)),
+            orientation_slopes_in_base_rad_per_m: in_base.map(|slopes| rows(&slopes.orientation)),
+            typical_mm: noise.field_m * 1e3,
+            typical_deg: noise.field_rad.to_degrees(),
+            heldout_rms_px,
+        }
+    }
+
     /// The field, to correct reported poses by.
     pub fn field(&self) -> PoseDependentError {
         let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
-        let (position, orientation) = (matrix(&self.position_slopes), matrix(&self.orientation_slopes_rad_per_m));
-        PoseDependentError::new(self.origin_m.into(), self.reach_m, &position, &orientation)
+        let slopes = |position, orientation| Slopes { position: matrix(position), orientation: matrix(orientation) };
+        let in_tip = slopes(&self.position_slopes, &self.orientation_slopes_rad_per_m);
+        let in_base = self.position_slopes_in_base.as_ref().zip(self.orientation_slopes_in_base_rad_per_m.as_ref());
+        let in_base = in_base.map(|(position, orientation)| slopes(position, orientation));
+        PoseDependentError::new(self.origin_m.into(), self.reach_m, &in_tip, in_base.as_ref())
+    }
+
+    pub(super) fn check(&self, at: &str) -> Checked {
+        let key = |key: &str| format!("{at}.{key}");
+        all_finite(&self.origin_m, &key("origin_m"))?;
+        require(self.reach_m > 0.0, key("reach_m"), "must be a positive length")?;
+        all_finite(self.position_slopes.as_flattened(), &key("position_slopes"))?;
+        all_finite(self.orientation_slopes_rad_per_m.as_flattened(), &key("orientation_slopes_rad_per_m"))?;
+        let (position, orientation) = (self.position_slopes_in_base, self.orientation_slopes_in_base_rad_per_m);
+        let both = position.is_some() == orientation.is_some();
+        require(both, key("position_slopes_in_base"), "must be there where orientation_slopes_in_base_rad_per_m is")?;
+        let in_base = position.into_iter().chain(orientation).flatten().flatten();
+        all_finite(&in_base.collect::<Vec<f64>>(), &key("position_slopes_in_base"))
     }
 }
 

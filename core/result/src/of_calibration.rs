@@ -2,15 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Matrix3;
-
 use super::{
     ArmEstimate, BoardEstimate, CalibrationResult, DepthsEstimate, EstimateDetails, IntrinsicsEstimate, MethodRecord,
     OverdispersionRecord, PoseDependentErrorEstimate, PrintEstimate, Provenance, Quality, ResidualDistortionEstimate,
     TargetSizeEstimate, ViewRecord, ViewRecordStatus,
 };
 use handeye_estimate::diagnose::Calibration;
-use handeye_estimate::handeye::joint::{PoseDependentError, PrintErrors, ShownDistortion};
+use handeye_estimate::handeye::joint::{PrintErrors, ShownDistortion};
 use handeye_estimate::placement::ArmOfViews;
 use handeye_estimate::uncertainty::overdispersion::Evidence;
 use handeye_estimate::{
@@ -110,7 +108,10 @@ fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {
             sigma: size.sigma,
             determined: size.is_determined(),
         }),
-        robot_field: joint.field.as_ref().map(|field| robot_field(field, joint)),
+        robot_field: joint
+            .field
+            .as_ref()
+            .map(|field| PoseDependentErrorEstimate::new(field, &joint.noise, joint.heldout_rms_px)),
         print: joint.print.as_ref().map(print),
         depths: joint.depths.as_ref().map(|depths| depths_estimate(&depths.in_fit)),
         residual_distortion: joint.residual_distortion.as_ref().map(residual_distortion),
@@ -146,19 +147,6 @@ fn of_camera(fit: &CameraFit) -> EstimateDetails {
         }),
         board: fit.shape.map(BoardEstimate::from),
         ..EstimateDetails::default()
-    }
-}
-
-fn robot_field(field: &PoseDependentError, joint: &JointFit) -> PoseDependentErrorEstimate {
-    let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)]]);
-    PoseDependentErrorEstimate {
-        origin_m: field.origin_m().into(),
-        reach_m: field.reach_m(),
-        position_slopes: rows(field.position_slopes()),
-        orientation_slopes_rad_per_m: rows(field.orientation_slopes()),
-        typical_mm: joint.noise.field_m * 1e3,
-        typical_deg: joint.noise.field_rad.to_degrees(),
-        heldout_rms_px: joint.heldout_rms_px,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Results with known numbers, for tests. Feature `testing`.
 
-use nalgebra::{DMatrix, Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
 use serde_json::json;
 
 use super::{
@@ -10,7 +10,9 @@ use super::{
 };
 use handeye_arm::{Arm, ArmKind};
 use handeye_estimate::handeye::HandEye;
-use handeye_estimate::handeye::joint::{ArmErrors, Free, Noise, SmallSample, arm_parameters};
+use handeye_estimate::handeye::joint::{
+    ArmErrors, Free, Noise, PoseDependentError, Slopes, SmallSample, arm_parameters,
+};
 use handeye_estimate::{ArmFit, BesideArm};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -83,6 +85,8 @@ pub fn golden() -> CalibrationResult {
             reach_m: 0.3,
             position_slopes: [[1e-3, 0.0, -2e-3], [0.0, 5e-4, 0.0], [0.0; 3]],
             orientation_slopes_rad_per_m: [[0.0; 3], [2e-3, 0.0, 0.0], [0.0; 3]],
+            position_slopes_in_base: None,
+            orientation_slopes_in_base_rad_per_m: None,
             typical_mm: 0.4,
             typical_deg: 0.03,
             heldout_rms_px: Some(0.6),
@@ -169,7 +173,6 @@ pub fn golden_arm() -> (Arm, ArmFit) {
         beside: BesideArm {
             intrinsics: Intrinsics::pinhole(640, 480, 600.0),
             shape: BoardShape::default(),
-            field: None,
             depth: DepthBias::default(),
             free: Free { arm: true, ..Free::default() },
         },
@@ -188,4 +191,18 @@ pub fn golden_arm() -> (Arm, ArmFit) {
         contradicted: false,
     };
     (chain, fit)
+}
+
+/// The same with errors that depend on where the tip stands as well, per 0.25 m.
+pub fn golden_arm_with_a_field() -> (Arm, ArmFit) {
+    let (chain, fit) = golden_arm();
+    let slopes = |s: f64| Slopes {
+        position: Matrix3::from_fn(|i, j| 1e-3 * (s + (3 * i + j) as f64)),
+        orientation: Matrix3::from_fn(|i, j| 1e-3 * (s - (2 * i + j) as f64)),
+    };
+    let field = PoseDependentError::new(Vector3::new(0.4, -0.1, 0.5), 0.3, &slopes(0.5), Some(&slopes(1.5)));
+    let errors = fit.errors.clone().with_field(Some(field.per(0.25)));
+    let count = 12 + errors.number_count();
+    let covariance = DMatrix::from_fn(count, count, |i, j| if i == j { 1e-9 * (1.0 + i as f64) } else { 1e-11 });
+    (chain, ArmFit { errors, covariance, ..fit })
 }

@@ -30,7 +30,7 @@ pub struct Predictor {
     pub shape: BoardShape,
     /// What the points of the target are off their drawing, metres; empty where the calibration found nothing of the kind.
     pub print_errors_m: Vec<Vector2<f64>>,
-    /// Errors of the robot that depend on where it stands, where the calibration found them.
+    /// Errors of the robot that depend on where it stands, where the calibration found them and they are not among those of the arm.
     pub field: Option<PoseDependentError>,
     /// Errors of the robot's arm, where tip poses are corrected for them.
     pub arm: Option<ArmErrors>,
@@ -119,7 +119,7 @@ impl Predictor {
             intrinsics: arm.beside.intrinsics,
             shape: arm.beside.shape,
             print_errors_m: reported.print_errors_m,
-            field: arm.beside.field.clone(),
+            field: None,
             arm: Some(arm.errors.clone()),
             hand_eye_covariance: Some(arm.covariance.fixed_view::<6, 6>(0, 0).into_owned()),
             small_sample: arm.small_sample,

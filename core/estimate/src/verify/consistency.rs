@@ -14,8 +14,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
 use super::{CaptureCheck, Predictor, Uncertainty};
+use crate::handeye::joint::ArmErrors;
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::pose_dependent_error::{self, SLOPES};
 use crate::resolution;
 use handeye_geometry::se3;
 use handeye_geometry::targets::bent::BoardPoints;
@@ -70,8 +70,8 @@ impl Sums {
     /// `None` when the covariance is not one, or not of what this calibration is of.
     pub fn new(calibrated: &Predictor, uncertainty: &Uncertainty) -> Option<Self> {
         let form = uncertainty.free.form();
-        let slopes = if calibrated.field.is_some() { SLOPES } else { 0 };
-        let of_arm = calibrated.arm.as_ref().map_or(0, |arm| arm.values().len());
+        let slopes = calibrated.field.as_ref().map_or(0, |field| field.slopes().len());
+        let of_arm = calibrated.arm.as_ref().map_or(0, ArmErrors::number_count);
         let n = LINKS + form.count(&calibrated.intrinsics) + slopes + of_arm;
         if uncertainty.covariance.shape() != (n, n) {
             return None;
@@ -119,8 +119,8 @@ impl Sums {
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
         by_shared.columns_mut(LINKS, form).copy_from(&by_form);
         if let Some(field) = &calibrated.field {
-            let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
-            by_shared.columns_mut(LINKS + form, SLOPES).copy_from(&columns);
+            let columns = field.columns(&view.base_from_tip, &chain.by_correction);
+            by_shared.columns_mut(LINKS + form, columns.ncols()).copy_from(&columns);
         }
         let of_arm = chain.by_arm.ncols();
         by_shared.columns_mut(self.covariance.nrows() - of_arm, of_arm).copy_from(&chain.by_arm);

@@ -128,8 +128,8 @@ fn the_covariance_of_a_point_counts_the_errors_of_the_arm_with_those_of_the_came
             let links = &of_arm.hand_eye;
             let by: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0) * sign;
             moved.hand_eye = HandEye::new(t.mode, links.mount_from_camera().perturbed(&by), links.anchor_from_target());
-            let errors = moved.arm.as_mut().expect("corrected").values_mut();
-            errors.iter_mut().zip(step.iter().skip(12)).for_each(|(error, by)| *error += sign * by);
+            let errors = moved.arm.as_mut().expect("corrected").numbers_mut();
+            errors.zip(step.iter().skip(12)).for_each(|(error, by)| *error += sign * by);
             at(&moved).in_base.point()
         };
         let by = (moved(1.0) - moved(-1.0)) / 2.0;

@@ -25,7 +25,7 @@ use super::views::SessionViews;
 use crate::arm_fit::ArmFit;
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::pose_dependent_error::{self, HALF, Places, SLOPES};
+use crate::handeye::joint::pose_dependent_error::{Axes, PER_FRAME, Places};
 use crate::handeye::joint::{ArmErrors, LEVELS_OF_ARMS};
 use crate::resolution;
 use handeye_geometry::frames::Pose;
@@ -84,7 +84,7 @@ pub(super) struct Model<'a> {
 /// An arm whose joints are known.
 #[derive(Clone)]
 pub(super) struct KnownArm {
-    /// The errors at which the equations are linear.
+    /// The errors at which the equations are linear, without their field.
     pub errors: ArmErrors,
     /// Whether the joint estimate, which weighs what arms and what sizes are likely, has another size of the target beside them.
     pub beside_another_size: bool,
@@ -92,7 +92,7 @@ pub(super) struct KnownArm {
 
 impl From<&ArmFit> for KnownArm {
     fn from(fit: &ArmFit) -> Self {
-        Self { errors: fit.errors.clone(), beside_another_size: fit.beside.free.scale }
+        Self { errors: fit.errors.clone().with_field(None), beside_another_size: fit.beside.free.scale }
     }
 }
 
@@ -265,8 +265,8 @@ impl<'a> Model<'a> {
     fn slopes(&self) -> usize {
         match (&self.field, self.in_base) {
             (None, _) => 0,
-            (Some(_), false) => SLOPES,
-            (Some(_), true) => 2 * SLOPES,
+            (Some(_), false) => 2 * PER_FRAME,
+            (Some(_), true) => 4 * PER_FRAME,
         }
     }
 
@@ -282,14 +282,9 @@ impl<'a> Model<'a> {
             at += lens;
         }
         if let Some(places) = &self.field {
-            let place = places.at(&view.base_from_tip);
-            let tip_from_base = view.base_from_tip.isometry().rotation.inverse().to_rotation_matrix();
-            let mut turned = Matrix6::zeros();
-            for part in [0, 3] {
-                turned.fixed_view_mut::<3, 3>(part, part).copy_from(tip_from_base.matrix());
-            }
-            for by_error in [row.by_robot, row.by_robot * turned].iter().take(if self.in_base { 2 } else { 1 }) {
-                let columns = pose_dependent_error::columns(&place, by_error);
+            let field = places.at(&view.base_from_tip);
+            for axes in [Axes::Tip, Axes::Base].into_iter().take(if self.in_base { 2 } else { 1 }) {
+                let columns = field.columns(&[axes], &row.by_robot);
                 design.view_mut((0, at), (6, columns.ncols())).copy_from(&columns);
                 at += columns.ncols();
             }
@@ -398,7 +393,7 @@ impl<'a> Model<'a> {
         let mut at = end;
         std::array::from_fn(|k| {
             let Some(kind) = k.checked_sub(FIELD_PARTS) else {
-                let slope = |k: usize| (first + k * HALF).min(end);
+                let slope = |k: usize| (first + k * PER_FRAME).min(end);
                 return slope(k)..slope(k + 1);
             };
             let part = at..at + of_arm[kind];

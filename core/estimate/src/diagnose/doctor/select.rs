@@ -57,7 +57,7 @@ pub(super) fn select<'a>(
     work: &Work<'_>,
 ) -> Option<Selection<'a>> {
     // The errors of an arm that is known leave nothing to a field, but where the joint estimate has one beside them.
-    let is_told_by_arm = arm.is_some_and(|arm| arm.beside.field.is_none());
+    let is_told_by_arm = arm.is_some_and(|arm| arm.errors.field().is_none());
     let poses = sight.views.iter().map(|view| &view.base_from_tip);
     let places = if is_told_by_arm { None } else { Places::for_field(poses) };
     let most_work = if arm.is_some() { MOST_WORK_WITH_ARM } else { MOST_WORK };

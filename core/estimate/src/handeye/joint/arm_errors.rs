@@ -18,7 +18,8 @@
 //! Where masses are not known every joint and the tip weigh alike, and the base's z axis is vertical.
 //!
 //! The numbers are random effects with three levels (angles, lengths, compliance), which are found and integrated as all other
-//! noise is, under what is known of arms ([`LEVELS_OF_ARMS`]).
+//! noise is, under what is known of arms ([`LEVELS_OF_ARMS`]). Where the views show that something else changes smoothly with the place
+//! of the tip, a field ([`PoseDependentError`]) is between the tip by its links and the true one.
 //!
 //! # Reference
 //! Hayati & Mirmirani 1985, "Improving the absolute positioning accuracy of robot manipulators" (parallel axes); Mooring, Roth &
@@ -27,6 +28,7 @@
 use nalgebra::{Isometry3, Matrix6xX, Vector3, Vector6};
 
 use super::chain::{correction_jacobian, correction_transform};
+use super::pose_dependent_error::PoseDependentError;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::se3;
 use handeye_geometry::targets::observation::View;
@@ -111,6 +113,8 @@ pub struct ArmErrors {
     joints: usize,
     /// In the order of [`arm_parameters`].
     values: Vec<f64>,
+    /// What changes smoothly with the place of the tip and is no error of a link.
+    field: Option<PoseDependentError>,
 }
 
 /// Where the tip really is, in the frame of the reported tip.
@@ -118,19 +122,30 @@ pub struct ArmErrors {
 pub struct TrueTip {
     /// `reported_from_true`
     pub reported_from_true: Isometry3<f64>,
-    /// The twists `[t; r]` on its right by which it turns with the errors, in the order of [`arm_parameters`].
+    /// The twists `[t; r]` on its right by which it turns with the errors, in the order of [`ArmErrors::numbers`].
     pub by_errors: Matrix6xX<f64>,
 }
 
 impl ArmErrors {
     /// None, of an arm with so many joints.
     pub fn none(joints: usize) -> Self {
-        Self { joints, values: vec![0.0; arm_parameters(joints).len()] }
+        Self { joints, values: vec![0.0; arm_parameters(joints).len()], field: None }
     }
 
     /// With these values, in the order of [`arm_parameters`]; `None` for another number of them.
     pub fn new(joints: usize, values: Vec<f64>) -> Option<Self> {
-        (values.len() == arm_parameters(joints).len()).then_some(Self { joints, values })
+        (values.len() == arm_parameters(joints).len()).then_some(Self { joints, values, field: None })
+    }
+
+    /// The same with a part that changes with the place of the tip and is no error of a link, or without one.
+    #[must_use]
+    pub fn with_field(self, field: Option<PoseDependentError>) -> Self {
+        Self { field, ..self }
+    }
+
+    /// That part.
+    pub fn field(&self) -> Option<&PoseDependentError> {
+        self.field.as_ref()
     }
 
     /// Number of joints.
@@ -138,16 +153,32 @@ impl ArmErrors {
         self.joints
     }
 
-    /// In the order of [`arm_parameters`]: radians and metres.
+    /// Of the links and joints, in the order of [`arm_parameters`]: radians and metres.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    pub(crate) fn values_mut(&mut self) -> &mut [f64] {
-        &mut self.values
+    /// All numbers: the slopes of the field, where there is one, then [`values`](Self::values).
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        self.field.iter().flat_map(PoseDependentError::slopes).chain(&self.values).copied()
     }
 
-    /// How many numbers have which level.
+    /// How many numbers there are.
+    pub fn number_count(&self) -> usize {
+        self.values.len() + self.slope_count()
+    }
+
+    /// How many of them are slopes.
+    pub fn slope_count(&self) -> usize {
+        self.field.as_ref().map_or(0, |field| field.slopes().len())
+    }
+
+    /// In the order of [`numbers`](Self::numbers).
+    pub(crate) fn numbers_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.field.iter_mut().flat_map(PoseDependentError::slopes_mut).chain(&mut self.values)
+    }
+
+    /// How many values have which level.
     pub(crate) fn counts(&self) -> [usize; KINDS] {
         let parameters = arm_parameters(self.joints);
         std::array::from_fn(|kind| parameters.iter().filter(|parameter| parameter.error.kind() == kind).count())
@@ -162,20 +193,28 @@ impl ArmErrors {
     /// [`View::tip_from_joints`]; where it is reported when these are not of this arm.
     pub fn true_tip(&self, base_from_tip: &Pose<Base, Tip>, tip_from_joints: &[Isometry3<f64>]) -> TrueTip {
         let parameters = arm_parameters(self.joints);
-        let mut by_errors = Matrix6xX::zeros(parameters.len());
+        let mut by_errors = Matrix6xX::zeros(self.number_count());
         let mut reported_from_true = Isometry3::identity();
         if tip_from_joints.len() != self.joints {
             return TrueTip { reported_from_true, by_errors };
         }
         let torques = torques(base_from_tip, tip_from_joints);
         let errors = self.of_joints(&parameters, &torques);
+        let mut slopes = 0;
+        if let Some(field) = &self.field {
+            let correction = field.correction(base_from_tip);
+            let columns = field.columns(base_from_tip, &correction_jacobian(&correction));
+            slopes = columns.ncols();
+            by_errors.columns_mut(0, slopes).copy_from(&columns);
+            reported_from_true = correction_transform(&correction);
+        }
         // From the last joint to the first: what a joint does at the tip is seen through the errors behind it.
         for joint in (1..self.joints).rev() {
             let tip_from_joint = tip_from_joints[joint];
             let through =
                 se3::adjoint(&(reported_from_true.inverse() * tip_from_joint)) * correction_jacobian(&errors[joint]);
             for (k, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.joint == joint) {
-                by_errors.set_column(k, &(through * parameter.error.unit(torques[joint])));
+                by_errors.set_column(slopes + k, &(through * parameter.error.unit(torques[joint])));
             }
             reported_from_true = moved_by(&errors[joint], &tip_from_joint) * reported_from_true;
         }
@@ -192,13 +231,15 @@ impl ArmErrors {
             return Isometry3::identity();
         }
         let errors = self.of_joints(&arm_parameters(self.joints), &torques(base_from_tip, tip_from_joints));
-        errors
+        let by_links = errors
             .iter()
             .zip(tip_from_joints)
-            .fold(Isometry3::identity(), |tip, (error, tip_from_joint)| tip * moved_by(error, tip_from_joint))
+            .fold(Isometry3::identity(), |tip, (error, tip_from_joint)| tip * moved_by(error, tip_from_joint));
+        let field = self.field.as_ref();
+        field.map_or(by_links, |field| by_links * correction_transform(&field.correction(base_from_tip)))
     }
 
-    /// What each joint is displaced by in its frame at rest, without what gravity does.
+    /// What each joint is displaced by in its frame at rest, without what gravity does and without the field.
     pub(crate) fn at_rest(&self) -> Vec<Isometry3<f64>> {
         let weightless = vec![0.0; self.joints];
         self.of_joints(&arm_parameters(self.joints), &weightless).iter().map(correction_transform).collect()
@@ -240,7 +281,10 @@ fn torques(base_from_tip: &Pose<Base, Tip>, tip_from_joints: &[Isometry3<f64>]) 
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix3;
+
     use super::*;
+    use crate::handeye::joint::pose_dependent_error::Slopes;
 
     fn frames() -> Vec<Isometry3<f64>> {
         let twist = |j: usize| Vector6::from_fn(|i, _| ((5 * j + 3 * i) as f64).sin() * if i < 3 { 0.4 } else { 1.2 });
@@ -252,17 +296,30 @@ mod tests {
         ArmErrors::new(6, (0..count).map(|k| ((k * k) as f64).sin() * 0.03).collect()).expect("so many")
     }
 
+    fn errors_and_a_field() -> ArmErrors {
+        let slopes = |s: f64| Slopes {
+            position: Matrix3::from_fn(|i, j| (s + (3 * i + j) as f64).sin() * 0.05),
+            orientation: Matrix3::from_fn(|i, j| (s + (2 * i + 5 * j) as f64).cos() * 0.1),
+        };
+        errors().with_field(Some(PoseDependentError::new(Vector3::x(), 2.0, &slopes(0.3), Some(&slopes(1.4)))))
+    }
+
     #[test]
     fn the_derivatives_are_those_of_the_exact_chain() {
         const STEP: f64 = 1e-6;
-        let (frames, errors, pose) = (frames(), errors(), Pose::from_isometry(frames()[2]));
-        let at = errors.true_tip(&pose, &frames);
-        for k in 0..errors.values().len() {
-            let mut moved = errors.clone();
-            moved.values_mut()[k] += STEP;
-            let after = moved.true_tip(&pose, &frames).reported_from_true;
-            let turned = se3::log(&(at.reported_from_true.inverse() * after)) / STEP;
-            assert!((turned - at.by_errors.column(k)).norm() < 1e-5, "{k}: {turned} {}", at.by_errors.column(k));
+        let (frames, pose) = (frames(), Pose::from_isometry(frames()[2]));
+        for errors in [errors(), errors_and_a_field()] {
+            let at = errors.true_tip(&pose, &frames);
+            let alone = errors.reported_from_true(&pose, &frames);
+            assert!(se3::log(&(at.reported_from_true.inverse() * alone)).norm() < 1e-12);
+            assert_eq!(errors.numbers().count(), errors.number_count());
+            for k in 0..errors.number_count() {
+                let mut moved = errors.clone();
+                *moved.numbers_mut().nth(k).expect("so many") += STEP;
+                let after = moved.true_tip(&pose, &frames).reported_from_true;
+                let turned = se3::log(&(at.reported_from_true.inverse() * after)) / STEP;
+                assert!((turned - at.by_errors.column(k)).norm() < 1e-5, "{k}: {turned} {}", at.by_errors.column(k));
+            }
         }
     }
 

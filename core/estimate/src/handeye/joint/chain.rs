@@ -105,7 +105,7 @@ mod tests {
         let frames = [0.3, -0.7, 1.1].map(pose).to_vec();
         let view = View { tip_from_joints: frames, ..View::new(String::new(), h, Vec::new()) };
         let mut arm = ArmErrors::none(3);
-        arm.values_mut().iter_mut().enumerate().for_each(|(k, value)| *value = 0.02 * (k as f64).cos());
+        arm.numbers_mut().enumerate().for_each(|(k, value)| *value = 0.02 * (k as f64).cos());
         for mode in [Mode::EyeInHand, Mode::EyeToHand] {
             let at = |x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>, d: &Vector6<f64>, q: &ArmErrors| {
                 Chain::with_arm(mode, &view, Some(q), d, x, y)
@@ -126,7 +126,7 @@ mod tests {
             }
             for k in 0..arm.values().len() {
                 let mut moved = arm.clone();
-                moved.values_mut()[k] += STEP;
+                *moved.numbers_mut().nth(k).expect("so many") += STEP;
                 let turned = se3::log(
                     &(chain.camera_from_target.inverse() * at(&x, &y, &correction, &moved).camera_from_target),
                 ) / STEP;

@@ -8,7 +8,6 @@
 use nalgebra::{DMatrix, Isometry3, Matrix2xX, Matrix6, Matrix6xX, Point3, SMatrix, Vector2};
 
 use super::chain::Chain;
-use super::pose_dependent_error;
 use super::view_block::{Layout, prior_weight};
 use super::{Noise, PoseDependentError};
 use handeye_geometry::camera::Intrinsics;
@@ -42,10 +41,10 @@ impl<'a> ExpectedPixels<'a> {
         let mut by_shared = Matrix6xX::zeros(layout.count());
         by_shared.fixed_columns_mut::<6>(0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_columns_mut::<6>(6).copy_from(&Matrix6::identity());
-        by_shared.columns_mut(layout.arm_at(), chain.by_arm.ncols()).copy_from(&chain.by_arm);
+        layout.of_arm_in(&mut by_shared, &chain.by_arm);
         if let Some((field, base_from_tip)) = at {
-            let slopes = pose_dependent_error::columns(&field.place(base_from_tip), &chain.by_correction);
-            by_shared.columns_mut(layout.field_at(), layout.field).copy_from(&slopes);
+            let slopes = field.columns(base_from_tip, &chain.by_correction);
+            by_shared.columns_mut(layout.field_at(), slopes.ncols()).copy_from(&slopes);
         }
         let spread = Matrix6::from_diagonal(&prior_weight(noise).map(f64::recip));
         let by_robot = chain.by_correction * spread * chain.by_correction.transpose();

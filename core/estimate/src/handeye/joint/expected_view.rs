@@ -12,7 +12,8 @@ use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector2, Vector6};
 use super::arm_errors::{ArmErrors, KINDS};
 use super::chain::Chain;
 use super::expected_pixels::ExpectedPixels;
-use super::pose_dependent_error::{HALF, PoseDependentError, SLOPES};
+use super::pose_dependent_error::PoseDependentError;
+use super::variance::levels_of_effects;
 use super::view_block::{Layout, PixelWeights, ViewBlock, prior_weight, whitened};
 use super::{Free, Noise, SIZE_SIGMA};
 use crate::Fit;
@@ -74,7 +75,7 @@ impl ViewModel {
         let field = joint.field.clone();
         let layout = Layout {
             form: free.form().count(&intrinsics),
-            field: field.as_ref().map_or(0, |_| SLOPES),
+            field: field.as_ref().map_or(0, |field| field.slopes().len()),
             arm: [0; KINDS],
         };
         Some(Self {
@@ -93,13 +94,10 @@ impl ViewModel {
     /// The same with the errors of the arm among the unknowns; `None` where the calibration does not know them, see [`Fit::arm`].
     pub fn of_arm(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let arm = calibration.arm()?;
-        let BesideArm { intrinsics, shape, field, free, .. } = arm.beside.clone();
+        let BesideArm { intrinsics, shape, free, .. } = arm.beside.clone();
         let free = Free { depth: false, ..free };
-        let layout = Layout {
-            form: free.form().count(&intrinsics),
-            field: field.as_ref().map_or(0, |_| SLOPES),
-            arm: arm.errors.counts(),
-        };
+        let layout =
+            Layout { form: free.form().count(&intrinsics), field: arm.errors.slope_count(), arm: arm.errors.counts() };
         Some(Self {
             hand_eye: arm.hand_eye,
             intrinsics,
@@ -107,7 +105,7 @@ impl ViewModel {
             noise: arm.noise,
             board: BoardPoints::new(&target.points()),
             shape,
-            field,
+            field: None,
             arm: Some(arm.errors.clone()),
             layout,
         })
@@ -160,7 +158,7 @@ impl ViewModel {
 
     /// Where the hand-eye transform and the errors of the arm are among the unknowns.
     pub fn hand_eye_and_arm(&self) -> impl Iterator<Item = usize> {
-        (0..6).chain(self.layout.arm_at()..self.layout.count())
+        (0..6).chain(self.layout.field_at()..self.layout.count())
     }
 
     /// Number of the unknowns that all views share.
@@ -178,15 +176,10 @@ impl ViewModel {
                 *value = if k < 4 { focal_px } else { 10.0 };
             }
         }
-        for k in 0..self.layout.field {
-            sigma[self.layout.field_at() + k] = if k < HALF { self.noise.field_m } else { self.noise.field_rad };
-        }
         if self.free.scale {
             sigma[Layout::FORM_AT + self.free.form().scale_at(&self.intrinsics)] = SIZE_SIGMA;
         }
-        let [.., angles, lengths, compliances] = self.layout.effects();
-        let levels = [self.noise.link_rad, self.noise.link_m, self.noise.compliance_rad];
-        for (places, level) in [angles, lengths, compliances].into_iter().zip(levels) {
+        for (places, level) in self.layout.effects().into_iter().zip(levels_of_effects(&self.noise)) {
             sigma[places].fill(level);
         }
         DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
@@ -210,8 +203,8 @@ impl ViewModel {
             depths: None,
         };
         let equations = PoseEquations::new(&seen, &chain.camera_from_target, self.free.form()).ok()?;
-        let place = self.field.as_ref().map(|field| field.place(&posture.base_from_tip));
-        ViewBlock::new(&chain, &equations, self.layout, place.as_ref())
+        let field = self.field.as_ref().map(|field| (field, &posture.base_from_tip));
+        ViewBlock::new(&chain, &equations, self.layout, field)
     }
 
     fn chain(&self, posture: &Posture) -> Chain {

@@ -74,7 +74,7 @@ pub use chain::{camera_from_target, correction_transform};
 pub use expected_pixels::ExpectedPixels;
 pub use expected_view::{ExpectedView, Posture, ViewModel};
 pub use integrated::SmallSample;
-pub use pose_dependent_error::{FIELD_VIEWS, PoseDependentError, corrected_base_from_tip};
+pub use pose_dependent_error::{FIELD_VIEWS, PoseDependentError, Slopes, corrected_base_from_tip};
 pub use weights::CornerWeights;
 
 use curvature::Optimum;
@@ -122,7 +122,7 @@ pub(crate) fn fit<'a>(
     let mut state = State::new(problem, start);
     let mut noise = problem.noise.or(start.noise).unwrap_or_else(|| variance::starting_noise(problem, &state));
     let mut levels =
-        Levels { view: problem.view_noise == Some(true), field: state.field.is_some(), arm: state.arm.is_some() };
+        Levels { view: problem.view_noise == Some(true), field: state.has_field(), arm: state.arm.is_some() };
     if problem.noise.is_none() {
         // Whether the corners of a view share noise is decided by these views alone, not by where the fit began.
         if !levels.view {
@@ -213,7 +213,7 @@ pub(crate) fn with_stated_error(
     let integrated = if problem.noise.is_some() {
         Integrated { covariance: plain.clone(), small_sample: SmallSample::KNOWN }
     } else {
-        let levels = Levels { view: noise.view_px > 0.0, field: state.field.is_some(), arm: state.arm.is_some() };
+        let levels = Levels { view: noise.view_px > 0.0, field: state.has_field(), arm: state.arm.is_some() };
         integrated::integrate(system, noise, levels, plain.clone(), &solution.reference_point)?
     };
     let optimum = Optimum { problem, state: &state, system, noise, reduced: &reduced, covariance: &plain };

@@ -249,8 +249,8 @@ fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<
             reason: "the estimate puts the target behind the camera",
         }
     })?;
-    let place = state.field.as_ref().map(|field| field.place(&view.base_from_tip));
-    ViewBlock::new(&chain, &equations, state.layout(problem), place.as_ref()).ok_or(HandEyeError::NoSolution {
+    let field = state.field.as_ref().map(|field| (field, &view.base_from_tip));
+    ViewBlock::new(&chain, &equations, state.layout(problem), field).ok_or(HandEyeError::NoSolution {
         method: METHOD,
         views: problem.views.len(),
         reason: "the corners of a view lie on a line and determine no pose",

@@ -9,10 +9,9 @@
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Vector6};
+use nalgebra::{Cholesky, DMatrix, Isometry3, Matrix6, Matrix6xX, Vector6};
 
 use super::normal::System;
-use super::pose_dependent_error;
 use super::variance::levels_of_effects;
 use super::view_block::{Layout, prior_weight};
 use super::{JointProblem, JointSolution, JointStart, Noise, fit};
@@ -131,8 +130,7 @@ fn distances(
     (solution, kept): (&JointSolution, &[usize]),
     own: &[Pose<Camera, Target>],
 ) -> Result<Vec<Judged>, HandEyeError> {
-    let mut state = State::of(solution);
-    state.field = state.field.map(|field| field.reaching(views.iter().map(|view| &view.base_from_tip)));
+    let state = State::of(solution).reaching(views);
     let system = &*solution.system;
     let covariance = system.reduce(&solution.noise)?.inverse();
     let layout = system.layout;
@@ -156,14 +154,14 @@ fn distances(
         let Some(factor) = Cholesky::new(equations.pose) else { return gone() };
         let (metres, radians) = apart(&chain.camera_from_target, &seen, &centre);
         let error = se3::log(&(chain.camera_from_target.inverse() * seen));
-        let mut by_shared = DMatrix::zeros(6, layout.count());
+        let mut by_shared = Matrix6xX::zeros(layout.count());
         by_shared.fixed_view_mut::<6, 6>(0, 0).copy_from(&chain.by_hand_eye);
         by_shared.fixed_view_mut::<6, 6>(0, 6).copy_from(&Matrix6::identity());
         by_shared.columns_mut(Layout::FORM_AT, layout.form).copy_from(&factor.solve(&equations.pose_by_form));
-        by_shared.columns_mut(layout.arm_at(), chain.by_arm.ncols()).copy_from(&chain.by_arm);
+        layout.of_arm_in(&mut by_shared, &chain.by_arm);
         if let Some(field) = &state.field {
-            let columns = pose_dependent_error::columns(&field.place(&view.base_from_tip), &chain.by_correction);
-            by_shared.columns_mut(layout.field_at(), pose_dependent_error::SLOPES).copy_from(&columns);
+            let columns = field.columns(&view.base_from_tip, &chain.by_correction);
+            by_shared.columns_mut(layout.field_at(), columns.ncols()).copy_from(&columns);
         }
         let shared = &by_shared * &covariance * by_shared.transpose();
         let shared = Matrix6::from_fn(|r, c| shared[(r, c)]);

@@ -1,27 +1,29 @@
 //! Errors of the robot that depend on where it stands: a field that is affine in the place of the tip.
 //!
 //! An arm whose links are not as its controller takes them to be is off by amounts that change smoothly over its
-//! workspace. To first order the error of the tip, in its own axes, is an affine function of its place in the base. The
-//! eighteen slopes are random effects with two variances of their own, position and orientation, which are found as those of the noise are (restricted maximum
-//! likelihood). Without them a smooth error of the arm is taken for noise that is independent from view to view, and the
-//! stated uncertainty is too small; or it looks like a board that moved, a target of another size or a wrong lens. Where
-//! the data show none, the model goes without.
+//! workspace. To first order the error of the tip is an affine function of its place in the base: what is wrong near the wrist in the
+//! axes of the tip, what is wrong near the base in the axes of the base. The slopes, eighteen in the axes of a frame, are random effects
+//! with two variances of their own, position and orientation, which are found as those of the noise are (restricted maximum
+//! likelihood). Without them a smooth error of the arm is taken for noise that is independent from view to view, and the stated
+//! uncertainty is too small; or it looks like a board that moved, a target of another size or a wrong lens. Where the data show none,
+//! the model goes without.
+//!
+//! By reported poses the slopes are those in the axes of the tip alone ([`IN_TIP`]): commands go without a correction then, and with
+//! more freedom the transform follows the arm where it is exact and leaves the more to commands where it is not. Beside the errors of
+//! an arm, by which commands are corrected, they are in both ([`IN_BOTH`]).
 //!
 //! Source: Henderson 1975, "Best linear unbiased estimation and prediction under a selection model" (random effects in
 //! the normal equations).
 
-use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVectorView, Matrix3, Matrix6, Vector3, Vector6};
 
 use super::arm_errors::ArmErrors;
 use super::chain::correction_transform;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::targets::observation::View;
 
-/// Slopes: of six errors along three axes. Those of position are first; the three along one axis of the base are
-/// neighbours.
-pub(crate) const SLOPES: usize = 18;
-/// Slopes of position, and of orientation.
-pub(crate) const HALF: usize = SLOPES / 2;
+/// Slopes of errors of one kind in the axes of one frame: along three axes of the base, which are neighbours.
+pub(crate) const PER_FRAME: usize = 9;
 /// Views from which on a field is looked for. With fewer there are not twice as many numbers as unknowns and slopes, and the
 /// slopes are the noise.
 pub const FIELD_VIEWS: usize = 10;
@@ -32,7 +34,8 @@ const LEAST_SPREAD_M: f64 = 1e-3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Places {
     mean: Vector3<f64>,
-    rms_m: f64,
+    /// Length of way per which slopes count: the RMS distance from the mean.
+    unit_m: f64,
     /// Largest distance from the mean.
     reach_m: f64,
 }
@@ -45,7 +48,7 @@ impl Places {
         let distances = poses.map(|pose| (pose.translation() - mean).norm());
         let (squares, reach_m) = distances.fold((0.0, 0.0), |(sum, most): (f64, f64), d| (sum + d * d, most.max(d)));
         let rms_m = (squares / count).sqrt();
-        (rms_m > LEAST_SPREAD_M).then_some(Self { mean, rms_m, reach_m })
+        (rms_m > LEAST_SPREAD_M).then_some(Self { mean, unit_m: rms_m, reach_m })
     }
 
     /// The same where the poses are enough to show a field.
@@ -53,51 +56,102 @@ impl Places {
         if poses.clone().count() < FIELD_VIEWS { None } else { Self::of(poses) }
     }
 
-    /// Where a pose is, in the base's axes; over the session of mean zero and RMS one. A pose beyond the reach of the
-    /// session counts as at its edge: nothing is known of the field there.
-    pub fn at(&self, base_from_tip: &Pose<Base, Tip>) -> Vector3<f64> {
+    /// Where a pose is for the field. A pose beyond the reach of the session counts as at its edge: nothing is known of the field
+    /// there.
+    pub fn at(&self, base_from_tip: &Pose<Base, Tip>) -> FieldAt {
         let from_mean = base_from_tip.translation() - self.mean;
         let within = (self.reach_m / from_mean.norm()).min(1.0);
-        from_mean * (within / self.rms_m)
+        FieldAt {
+            place: from_mean * (within / self.unit_m),
+            tip_from_base: base_from_tip.rotation().inverse().to_rotation_matrix().into_inner(),
+        }
     }
 }
 
-/// How something turns with the slopes at a place, where `by_robot` is how it turns with the error of the tip.
-pub(crate) fn columns(place: &Vector3<f64>, by_robot: &Matrix6<f64>) -> DMatrix<f64> {
-    let mut columns = DMatrix::zeros(6, SLOPES);
-    for (part, at) in [(0, 0), (3, HALF)] {
-        for (axis, by) in place.iter().enumerate() {
-            let slopes = by_robot.fixed_columns::<3>(part) * *by;
-            columns.view_mut((0, at + 3 * axis), (6, 3)).copy_from(&slopes);
+/// Whose axes an error is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Axes {
+    Tip,
+    Base,
+}
+
+/// A field that goes with reported poses.
+pub(crate) const IN_TIP: &[Axes] = &[Axes::Tip];
+/// A field beside the errors of an arm.
+pub(crate) const IN_BOTH: &[Axes] = &[Axes::Tip, Axes::Base];
+
+/// A reported pose as the field is a function of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FieldAt {
+    /// From the middle of the session, in the axes of the base and over their spread.
+    place: Vector3<f64>,
+    tip_from_base: Matrix3<f64>,
+}
+
+impl FieldAt {
+    /// How something turns with the slopes in the axes of these frames, where `by_robot` is how it turns with the error of the tip: those
+    /// of position, then those of orientation, each frame by frame.
+    pub fn columns(&self, frames: &[Axes], by_robot: &Matrix6<f64>) -> DMatrix<f64> {
+        let half = PER_FRAME * frames.len();
+        let mut columns = DMatrix::zeros(6, 2 * half);
+        for (part, first) in [(0, 0), (3, half)] {
+            let in_tip = by_robot.fixed_columns::<3>(part).into_owned();
+            for (k, axes) in frames.iter().enumerate() {
+                let by_error = if *axes == Axes::Tip { in_tip } else { in_tip * self.tip_from_base };
+                for (axis, by) in self.place.iter().enumerate() {
+                    columns.columns_mut(first + PER_FRAME * k + 3 * axis, 3).copy_from(&(by_error * *by));
+                }
+            }
         }
+        columns
     }
-    columns
+}
+
+/// Slopes of errors in the axes of one frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Slopes {
+    /// Metres of error per metre of way.
+    pub position: Matrix3<f64>,
+    /// Radians of error per metre of way, as a rotation vector.
+    pub orientation: Matrix3<f64>,
 }
 
 /// The error of the tip as an affine function of its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseDependentError {
     places: Places,
-    /// Metres and radians at a distance of the RMS spread of the places.
-    slopes: [f64; SLOPES],
+    frames: &'static [Axes],
+    /// As the columns of [`FieldAt::columns`]: metres and radians per unit of way.
+    slopes: Vec<f64>,
 }
 
 impl PoseDependentError {
-    /// By its origin and its reach \[m\] and its slopes, as [`Self::position_slopes`] and [`Self::orientation_slopes`] give them.
-    pub fn new(
-        origin_m: Vector3<f64>,
-        reach_m: f64,
-        position_slopes: &Matrix3<f64>,
-        orientation_slopes: &Matrix3<f64>,
-    ) -> Self {
-        let mut field = Self::none(Places { mean: origin_m, rms_m: 1.0, reach_m });
-        field.slopes[..HALF].copy_from_slice(position_slopes.as_slice());
-        field.slopes[HALF..].copy_from_slice(orientation_slopes.as_slice());
-        field
+    /// By its origin and its reach \[m\] and its slopes, as [`Self::in_tip`] and [`Self::in_base`] give them.
+    pub fn new(origin_m: Vector3<f64>, reach_m: f64, in_tip: &Slopes, in_base: Option<&Slopes>) -> Self {
+        let frames: Vec<&Slopes> = std::iter::once(in_tip).chain(in_base).collect();
+        let position = frames.iter().flat_map(|slopes| slopes.position.as_slice());
+        let orientation = frames.iter().flat_map(|slopes| slopes.orientation.as_slice());
+        Self {
+            places: Places { mean: origin_m, unit_m: 1.0, reach_m },
+            slopes: position.chain(orientation).copied().collect(),
+            frames: if in_base.is_some() { IN_BOTH } else { IN_TIP },
+        }
     }
 
-    pub(crate) fn none(places: Places) -> Self {
-        Self { places, slopes: [0.0; SLOPES] }
+    /// The same field with its slopes counted per another length \[m\].
+    #[must_use]
+    pub fn per(mut self, unit_m: f64) -> Self {
+        for slope in &mut self.slopes {
+            *slope *= unit_m / self.places.unit_m;
+        }
+        self.places.unit_m = unit_m;
+        self
+    }
+
+    pub(crate) fn none(places: Places, frames: &'static [Axes]) -> Self {
+        // What all frames make together at a typical distance is, per axis, as large as one slope.
+        let places = Places { unit_m: places.unit_m * (frames.len() as f64).sqrt(), ..places };
+        Self { places, frames, slopes: vec![0.0; 2 * PER_FRAME * frames.len()] }
     }
 
     /// The same slopes, affine as far as these poses go, too: where they are judged by what the field predicts and is uncertain
@@ -108,16 +162,24 @@ impl PoseDependentError {
         self
     }
 
-    pub(crate) fn place(&self, base_from_tip: &Pose<Base, Tip>) -> Vector3<f64> {
-        self.places.at(base_from_tip)
+    /// How something turns with the slopes at a reported pose, where `by_robot` is how it turns with the error of the tip.
+    pub(crate) fn columns(&self, base_from_tip: &Pose<Base, Tip>, by_robot: &Matrix6<f64>) -> DMatrix<f64> {
+        self.places.at(base_from_tip).columns(self.frames, by_robot)
     }
 
-    pub(crate) fn slopes(&self) -> &[f64; SLOPES] {
+    /// Position first, then orientation; each in the axes of the tip, then in those of the base where there are such; metres and radians
+    /// per [`unit_m`](Self::unit_m), by columns.
+    pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
 
-    pub(crate) fn slopes_mut(&mut self) -> &mut [f64; SLOPES] {
+    pub(crate) fn slopes_mut(&mut self) -> &mut [f64] {
         &mut self.slopes
+    }
+
+    /// Length of way per which the slopes count, metres.
+    pub fn unit_m(&self) -> f64 {
+        self.places.unit_m
     }
 
     /// Where the field is zero: the mean of the reported tip positions, base coordinates \[m\].
@@ -130,14 +192,22 @@ impl PoseDependentError {
         self.places.reach_m
     }
 
-    /// Metres of error per metre of way: `rho = A (p - origin)`, in the axes of the tip, for the tip at `p` in the base.
-    pub fn position_slopes(&self) -> Matrix3<f64> {
-        Matrix3::from_column_slice(&self.slopes[..HALF]) / self.places.rms_m
+    /// Slopes of the errors in the axes of the tip.
+    pub fn in_tip(&self) -> Slopes {
+        self.in_frame(0)
     }
 
-    /// Radians of error per metre of way: the rotation vector `phi = B (p - origin)`, likewise.
-    pub fn orientation_slopes(&self) -> Matrix3<f64> {
-        Matrix3::from_column_slice(&self.slopes[HALF..]) / self.places.rms_m
+    /// Slopes of the errors in the axes of the base; `None` where these were not estimated.
+    pub fn in_base(&self) -> Option<Slopes> {
+        (self.frames.len() > 1).then(|| self.in_frame(1))
+    }
+
+    fn in_frame(&self, frame: usize) -> Slopes {
+        let part = |half: usize| {
+            let at = half * self.slopes.len() / 2 + frame * PER_FRAME;
+            Matrix3::from_column_slice(&self.slopes[at..at + PER_FRAME]) / self.places.unit_m
+        };
+        Slopes { position: part(0), orientation: part(1) }
     }
 
     /// Where the tip is by a reported pose.
@@ -147,16 +217,16 @@ impl PoseDependentError {
     }
 
     /// Error of a reported tip pose: translation \[m\] and rotation vector \[rad\] in the axes of the tip. The true pose is
-    /// `base_from_tip * (rho, exp(phi))`.
+    /// `base_from_tip * (rho, exp(phi))`; with `p` the reported place, `R` the reported rotation and slopes `A`, `B` in the axes of the
+    /// tip and `A'`, `B'` in those of the base, `rho = (A + Rᵀ A') (p - origin)` and `phi = (B + Rᵀ B') (p - origin)`.
     pub fn correction(&self, base_from_tip: &Pose<Base, Tip>) -> Vector6<f64> {
-        let place = self.place(base_from_tip);
-        let part = |at: usize| Matrix3::from_column_slice(&self.slopes[at..at + HALF]) * place;
-        let (rho, phi) = (part(0), part(HALF));
-        Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
+        let by_slopes = self.columns(base_from_tip, &Matrix6::identity());
+        let correction = by_slopes * DVectorView::from_slice(&self.slopes, self.slopes.len());
+        Vector6::from_iterator(correction.iter().copied())
     }
 }
 
-/// The reported tip pose of a view with what is known of the robot's errors taken out: those of its arm and its field.
+/// The reported tip pose of a view with what is known of the robot's errors taken out: those of its arm, or its field.
 pub fn corrected_base_from_tip(
     view: &View,
     arm: Option<&ArmErrors>,
@@ -187,34 +257,40 @@ mod tests {
     #[test]
     fn the_columns_are_the_correction_by_the_slopes_and_the_formula_is_the_documented_one() {
         let poses = poses();
-        let mut field = PoseDependentError::none(Places::of(poses.iter()).expect("they are apart"));
-        for (k, slope) in field.slopes_mut().iter_mut().enumerate() {
-            *slope = 1e-3 * (k as f64 + 1.0);
-        }
         let by_robot = Matrix6::from_fn(|i, j| ((5 * i + j) as f64).cos());
-        for pose in &poses {
-            let correction = field.correction(pose);
-            let by_columns = columns(&field.place(pose), &by_robot) * DVector::from_row_slice(field.slopes());
-            assert!((by_columns - by_robot * correction).norm() < 1e-15);
-            let from_origin = pose.translation() - field.origin_m();
-            assert!((field.position_slopes() * from_origin - correction.fixed_rows::<3>(0)).norm() < 1e-15);
-            assert!((field.orientation_slopes() * from_origin - correction.fixed_rows::<3>(3)).norm() < 1e-15);
-            let read = PoseDependentError::new(
-                field.origin_m(),
-                field.reach_m(),
-                &field.position_slopes(),
-                &field.orientation_slopes(),
+        for frames in [IN_TIP, IN_BOTH] {
+            let mut field = PoseDependentError::none(Places::of(poses.iter()).expect("they are apart"), frames);
+            for (k, slope) in field.slopes_mut().iter_mut().enumerate() {
+                *slope = 1e-3 * (k as f64 + 1.0);
+            }
+            let (tip, base) = (field.in_tip(), field.in_base());
+            assert_eq!(base.is_some(), frames.len() == 2);
+            let of_base = base.unwrap_or_default();
+            for pose in &poses {
+                let correction = field.correction(pose);
+                let by_columns = field.columns(pose, &by_robot) * DVector::from_row_slice(field.slopes());
+                assert!((by_columns - by_robot * correction).norm() < 1e-15);
+                let from_origin = pose.translation() - field.origin_m();
+                let turn = pose.rotation().inverse();
+                let rho = tip.position * from_origin + turn * (of_base.position * from_origin);
+                let phi = tip.orientation * from_origin + turn * (of_base.orientation * from_origin);
+                assert!((rho - correction.fixed_rows::<3>(0)).norm() < 1e-15);
+                assert!((phi - correction.fixed_rows::<3>(3)).norm() < 1e-15);
+                let read = PoseDependentError::new(field.origin_m(), field.reach_m(), &tip, base.as_ref());
+                assert!((read.correction(pose) - correction).norm() < 1e-15);
+                assert!((read.per(0.3).correction(pose) - correction).norm() < 1e-15);
+            }
+            let far: Pose<Base, Tip> = Pose::from_isometry(Isometry3::translation(1e3, 0.0, 0.0));
+            let edge = (tip.position + of_base.position) * Vector3::x() * field.reach_m();
+            assert!(
+                (field.correction(&far).fixed_rows::<3>(0) - edge).norm() < 1e-2 * edge.norm(),
+                "nothing is known there"
             );
-            assert!((read.correction(pose) - correction).norm() < 1e-15);
+            if base.is_none() {
+                let sum = poses.iter().map(|pose| field.correction(pose)).sum::<Vector6<f64>>();
+                assert!(sum.norm() < 1e-14, "the constant part is the links'");
+            }
         }
-        let far: Pose<Base, Tip> = Pose::from_isometry(Isometry3::translation(1e3, 0.0, 0.0));
-        let edge = field.position_slopes() * Vector3::x() * field.reach_m();
-        assert!(
-            (field.correction(&far).fixed_rows::<3>(0) - edge).norm() < 1e-2 * edge.norm(),
-            "nothing is known there"
-        );
-        let sum = poses.iter().map(|pose| field.correction(pose)).sum::<Vector6<f64>>();
-        assert!(sum.norm() < 1e-14, "the constant part is the links'");
     }
 
     #[test]

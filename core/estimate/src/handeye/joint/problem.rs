@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::handeye::Mode;
 use crate::handeye::joint::arm_errors::ArmErrors;
-use crate::handeye::joint::pose_dependent_error::{Places, PoseDependentError};
+use crate::handeye::joint::pose_dependent_error::{Axes, IN_BOTH, IN_TIP, Places, PoseDependentError};
 use crate::handeye::joint::state::State;
 use crate::handeye::joint::weights::CornerWeights;
 use handeye_geometry::camera::Intrinsics;
@@ -131,17 +131,23 @@ impl<'a> JointProblem<'a> {
         self.weights.map_or(Whitener::Alike, |weights| weights.whitener(&view.corners))
     }
 
-    /// The arm without errors, where they are free and all views know its joints.
+    /// The arm without errors, where they are free and all views know its joints; with a field where that is free, too.
     pub(crate) fn arm(&self) -> Option<ArmErrors> {
         let joints = self.views.first()?.tip_from_joints.len();
         let all = joints > 1 && self.views.iter().all(|view| view.tip_from_joints.len() == joints);
-        (self.free.arm && all).then(|| ArmErrors::none(joints))
+        (self.free.arm && all).then(|| ArmErrors::none(joints).with_field(self.free_field(IN_BOTH)))
     }
 
-    /// The field without errors, where it is free and the tip does not stay where it is.
+    /// The field without errors, where it is free and belongs to no arm.
     pub(super) fn field(&self) -> Option<PoseDependentError> {
+        if self.arm().is_some() { None } else { self.free_field(IN_TIP) }
+    }
+
+    /// Where the tip does not stay where it is.
+    fn free_field(&self, frames: &'static [Axes]) -> Option<PoseDependentError> {
         let poses = self.views.iter().map(|view| &view.base_from_tip);
-        self.free.field.then(|| Places::of(poses).map(PoseDependentError::none)).flatten()
+        let places = Places::of(poses).filter(|_| self.free.field)?;
+        Some(PoseDependentError::none(places, frames))
     }
 }
 

@@ -22,7 +22,8 @@ const NEARLY: f64 = 0.8;
 pub(crate) const SIZE_SIGMA: f64 = 0.03;
 
 /// The estimate from `views` with a [`PoseDependentError`](super::PoseDependentError), when they show one; `without` is their estimate
-/// without it. `None` also when the noise levels are given, and with fewer than ten views.
+/// without it, with the errors of the arm where these are free: then the field is what they do not explain. `None` also when the noise
+/// levels are given, and with fewer than ten views.
 ///
 /// A target of another size than stated looks like a field that grows with the distance. So the field has to be likelier
 /// than another size of the target, too.
@@ -63,11 +64,12 @@ pub fn with_shown_field<'a>(
 /// it.
 fn gains(with: &JointProblem<'_>, without: &JointSolution, cancel: &CancelToken) -> Result<bool, HandEyeError> {
     let Some(plain) = without.deviance else { return Ok(false) };
-    let state = State { field: with.field(), ..State::of(without) };
+    let mut state = State { field: with.field(), ..State::of(without) };
+    state.arm = state.arm.map(|arm| arm.with_field(with.arm().and_then(|none| none.field().cloned())));
     let system = System::new(with, &state, cancel)?;
     let Noise { robot_m: field_m, robot_rad: field_rad, .. } = without.noise;
     let start = Noise { field_m, field_rad, ..without.noise };
-    let levels = Levels { view: start.view_px > 0.0, field: true, arm: false };
+    let levels = Levels { view: start.view_px > 0.0, field: true, arm: state.arm.is_some() };
     let start = variance::lifted(&system, &start, levels);
     let found = start.and_then(|start| variance::restricted_likelihood(&system, &start, levels, variance::ROUGHLY));
     Ok(determined(found)?.is_some_and(|(_, field)| plain - field >= NEARLY * GAIN))

@@ -4,7 +4,7 @@ use nalgebra::{DVector, Point3, Vector6};
 
 use crate::handeye::joint::arm_errors::{ArmErrors, KINDS};
 use crate::handeye::joint::chain::Chain;
-use crate::handeye::joint::pose_dependent_error::{PoseDependentError, SLOPES};
+use crate::handeye::joint::pose_dependent_error::PoseDependentError;
 use crate::handeye::joint::view_block::Layout;
 use crate::handeye::joint::{JointProblem, JointSolution, JointStart};
 use handeye_geometry::camera::Intrinsics;
@@ -25,7 +25,7 @@ pub struct State {
     pub depth: DepthBias,
     /// `None` when they are not free, and where a view does not know its joints.
     pub arm: Option<ArmErrors>,
-    /// `None` when it is not free.
+    /// `None` when it is not free, and where it belongs to the errors of the arm.
     pub field: Option<PoseDependentError>,
     /// Of every view, beyond that of the field.
     pub corrections: Vec<Vector6<f64>>,
@@ -62,7 +62,7 @@ impl State {
     pub fn layout(&self, problem: &JointProblem<'_>) -> Layout {
         Layout {
             form: problem.free.form().count(&self.intrinsics),
-            field: if self.field.is_some() { SLOPES } else { 0 },
+            field: self.slope_count(),
             arm: self.arm.as_ref().map_or([0; KINDS], ArmErrors::counts),
         }
     }
@@ -70,7 +70,28 @@ impl State {
     /// Slopes of the field and errors of the arm, in the order of the unknowns.
     pub fn effects(&self) -> Vec<f64> {
         let of_field = self.field.iter().flat_map(PoseDependentError::slopes);
-        of_field.chain(self.arm.iter().flat_map(ArmErrors::values)).copied().collect()
+        of_field.copied().chain(self.arm.iter().flat_map(ArmErrors::numbers)).collect()
+    }
+
+    /// Whether there are errors that depend on where the robot stands, by themselves or beside those of its links.
+    pub fn has_field(&self) -> bool {
+        self.slope_count() > 0
+    }
+
+    fn slope_count(&self) -> usize {
+        let of_arm = self.arm.as_ref().map_or(0, ArmErrors::slope_count);
+        self.field.as_ref().map_or(of_arm, |field| field.slopes().len())
+    }
+
+    /// The same field, affine as far as these views go, too.
+    pub fn reaching(mut self, views: &[View]) -> Self {
+        let reaching = |field: PoseDependentError| field.reaching(views.iter().map(|view| &view.base_from_tip));
+        self.field = self.field.map(reaching);
+        self.arm = self.arm.map(|arm| {
+            let field = arm.field().cloned().map(reaching);
+            arm.with_field(field)
+        });
+        self
     }
 
     /// Correction of a view by the field.
@@ -116,12 +137,9 @@ impl State {
             next.depth = DepthBias::new(std::array::from_fn(|k| before[k] + at(first + k)));
         }
         let layout = self.layout(problem);
-        for (k, slope) in next.field.iter_mut().flat_map(PoseDependentError::slopes_mut).enumerate() {
-            *slope += shared[layout.field_at() + k];
-        }
-        for (k, error) in next.arm.iter_mut().flat_map(ArmErrors::values_mut).enumerate() {
-            *error += shared[layout.arm_at() + k];
-        }
+        let of_field = next.field.iter_mut().flat_map(PoseDependentError::slopes_mut);
+        let effects = of_field.chain(next.arm.iter_mut().flat_map(ArmErrors::numbers_mut));
+        effects.zip(shared.iter().skip(layout.field_at())).for_each(|(effect, step)| *effect += step);
         for (correction, step) in next.corrections.iter_mut().zip(own) {
             *correction += step;
         }

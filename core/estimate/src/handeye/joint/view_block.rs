@@ -6,12 +6,13 @@
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix6, Matrix6xX, MatrixXx6, Vector3, Vector6};
+use nalgebra::{Cholesky, Const, DMatrix, DVector, Matrix6, Matrix6xX, MatrixXx6, Vector6};
 
 use super::Noise;
 use super::arm_errors::KINDS;
 use super::chain::Chain;
-use super::pose_dependent_error::{self, HALF, SLOPES};
+use super::pose_dependent_error::PoseDependentError;
+use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::view_equations::PoseEquations;
 
 /// Where which shared unknown is.
@@ -41,6 +42,12 @@ impl Layout {
         self.field_at() + self.field
     }
 
+    /// Puts the columns of an arm where its errors are, at the end of all unknowns.
+    pub fn of_arm_in(self, by_shared: &mut Matrix6xX<f64>, by_arm: &Matrix6xX<f64>) {
+        let count = by_arm.ncols();
+        by_shared.columns_mut(self.count() - count, count).copy_from(by_arm);
+    }
+
     /// Number of shared unknowns.
     pub fn count(self) -> usize {
         self.arm_at() + self.arm.iter().sum::<usize>()
@@ -49,7 +56,7 @@ impl Layout {
     /// Where the effects of each kind are.
     pub fn effects(self) -> [Range<usize>; EFFECTS] {
         let [angles, lengths, compliances] = self.arm;
-        let half = if self.field > 0 { HALF } else { 0 };
+        let half = self.field / 2;
         let mut at = self.field_at();
         [half, half, angles, lengths, compliances].map(|count| {
             at += count;
@@ -158,8 +165,14 @@ pub struct ViewBlock {
 }
 
 impl ViewBlock {
-    /// `None` when the corners of the view determine no pose. `place` is where the robot's field is taken, if there is one.
-    pub fn new(chain: &Chain, equations: &PoseEquations, layout: Layout, place: Option<&Vector3<f64>>) -> Option<Self> {
+    /// `None` when the corners of the view determine no pose. `field` is that of the robot and the reported pose, if there is one that
+    /// belongs to no arm.
+    pub fn new(
+        chain: &Chain,
+        equations: &PoseEquations,
+        layout: Layout,
+        field: Option<(&PoseDependentError, &Pose<Base, Tip>)>,
+    ) -> Option<Self> {
         let (PosePart { root, by_form, residual }, rest) = split(equations)?;
         let by_pose = root.transpose();
         let by_correction = by_pose * chain.by_correction;
@@ -167,11 +180,10 @@ impl ViewBlock {
         by_shared.fixed_columns_mut::<6>(0).copy_from(&(by_pose * chain.by_hand_eye));
         by_shared.fixed_columns_mut::<6>(6).copy_from(&by_pose);
         by_shared.columns_mut(Layout::FORM_AT, layout.form).copy_from(&by_form);
-        by_shared.columns_mut(layout.arm_at(), chain.by_arm.ncols()).copy_from(&(by_pose * &chain.by_arm));
-        if let Some(place) = place {
-            by_shared
-                .columns_mut(layout.field_at(), SLOPES)
-                .copy_from(&pose_dependent_error::columns(place, &by_correction));
+        layout.of_arm_in(&mut by_shared, &(by_pose * &chain.by_arm));
+        if let Some((field, base_from_tip)) = field {
+            let columns = field.columns(base_from_tip, &by_correction);
+            by_shared.columns_mut(layout.field_at(), layout.field).copy_from(&columns);
         }
         let by_shared = by_shared.transpose();
         let own = by_correction.tr_mul(&by_correction);

@@ -122,6 +122,15 @@ pub const BY_CHANCE: f64 = 5e-3;
 /// Probability that views left out are predicted worse by chance, at which they are.
 const WORSE_BY_CHANCE: f64 = 0.05;
 
+/// What a view left out is predicted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PredictedBy {
+    /// All of the model.
+    Model,
+    /// The model without a field that goes with reported poses: what they predict as they are.
+    Links,
+}
+
 /// Two models of the same views, by the views that they leave out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Compared {
@@ -133,20 +142,22 @@ pub(crate) struct Compared {
     pub is_worse: bool,
 }
 
-/// Compares two estimates from the same views, predicted as by [`held_out`]; `None` where one of them cannot be.
+/// Compares two estimates from the same views, predicted as in [`held_out`]; `None` where one of them cannot be.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`].
 pub(crate) fn compared(
     before: (&JointProblem<'_>, &JointSolution),
     after: (&JointProblem<'_>, &JointSolution),
+    by: PredictedBy,
     cancel: &CancelToken,
 ) -> Result<Option<Compared>, HandEyeError> {
+    let px = |of: &Squares| if by == PredictedBy::Model { of.px } else { of.links_px };
     let predicted = |(problem, solution)| predicted_by_view(problem, solution, cancel.into());
     let (Some(first), Some(second)) = (predicted(before)?, predicted(after)?) else { return Ok(None) };
     let corners: usize = before.0.views.iter().map(|view| view.corners.len()).sum();
-    let rms_px = |views: &[Squares]| (views.iter().map(|view| view.px).sum::<f64>() / corners as f64).sqrt();
-    let losses: Vec<f64> = first.iter().zip(&second).map(|(before, after)| after.px - before.px).collect();
+    let rms_px = |views: &[Squares]| (views.iter().map(px).sum::<f64>() / corners as f64).sqrt();
+    let losses: Vec<f64> = first.iter().zip(&second).map(|(before, after)| px(after) - px(before)).collect();
     let is_worse = better_by_chance(&losses) < WORSE_BY_CHANCE;
     Ok(Some(Compared { before_px: rms_px(&first), after_px: rms_px(&second), is_worse }))
 }

@@ -9,7 +9,7 @@ use crate::handeye::joint::{JointSolution, SmallSample};
 use handeye_geometry::point_error;
 
 pub use held_out::{BY_CHANCE, HeldOut, board_error_m, held_out, pose_of_view};
-pub(crate) use held_out::{compared, weighted_pose_of_view};
+pub(crate) use held_out::{PredictedBy, compared, weighted_pose_of_view};
 pub use tip_box::{BoxError, TipBox, tip_error_95_over};
 
 /// Expected error of a point that the camera measures, at the place where it saw the target: 95 % of errors are below
