@@ -138,6 +138,13 @@ def corners_give_the_answer_with_its_uncertainty(rng):
     known = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, intrinsics=LENS,
                               mode="eye_in_hand")
     assert 0 < known.tip_error_95_mm < result.tip_error_95_mm
+    # A lens that is known to half a pixel counts with that, and follows the views.
+    near_lens = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, intrinsics=LENS,
+                                  intrinsics_accuracy_px=0.5, mode="eye_in_hand")
+    assert known.tip_error_95_mm < near_lens.tip_error_95_mm < result.tip_error_95_mm
+    assert not near_lens.intrinsics_are_known and max(near_lens.intrinsics.sigma[2:]) < 0.5
+    raises(handeye.InputError, "intrinsics_accuracy_px", handeye.calibrate, corners=s.corners, target=BOARD,
+           base_from_tip=s.base_from_tip, intrinsics=LENS, intrinsics_accuracy_px=0.0, mode="eye_in_hand")
     for covariance in (result.hand_eye_covariance, result.target_covariance):
         assert covariance.shape == (6, 6)
         near(covariance, covariance.T, 1e-15)

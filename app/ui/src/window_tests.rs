@@ -436,6 +436,14 @@ fn the_board_and_the_mode_are_set_in_the_target_pane() {
     silent.until("the camera", |model| {
         model.document().meta.camera.is_some_and(|camera| camera.fixed && camera.intrinsics.is_some())
     });
+    silent.harness.get_by_label("Accuracy of the intrinsics").focus();
+    silent.steps();
+    silent.harness.event(egui::Event::Text("0.5".to_owned()));
+    silent.steps();
+    silent.press(egui::Modifiers::NONE, egui::Key::Enter);
+    silent.until("the accuracy", |model| {
+        model.document().meta.camera.is_some_and(|camera| camera.fixed && camera.accuracy_px == Some(0.5))
+    });
 }
 
 /// Every text that a shape shows.

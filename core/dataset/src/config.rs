@@ -96,6 +96,7 @@ pub(super) enum PoseDirection {
 #[serde(deny_unknown_fields)]
 struct RawCamera {
     fixed: bool,
+    accuracy_px: Option<Spanned<f64>>,
     width: Option<Spanned<i64>>,
     height: Option<Spanned<i64>>,
     fx: Option<Spanned<f64>>,
@@ -144,6 +145,7 @@ pub(super) struct Config {
 #[derive(Debug, Clone)]
 pub(super) struct CameraConfig {
     pub fixed: bool,
+    pub accuracy_px: Option<f64>,
     pub size: Option<(u32, u32)>,
     /// Model, with the coefficients where they are given.
     pub distortion: Distortion,
@@ -278,6 +280,7 @@ fn camera_config(raw: &Spanned<RawCamera>, row: usize) -> Result<CameraConfig, S
     if camera.fixed && camera.model.is_none() {
         return Err(missing("model", "fixed = true: \"none\", \"brown_conrady\", \"rational\" or \"fisheye\""));
     }
+    let accuracy_px = camera.accuracy_px.as_ref().map(|value| accuracy(value, camera.fixed)).transpose()?;
     let model = match (camera.model, &camera.distortion) {
         (Some(model), _) => model,
         (None, None) => ModelName::BrownConrady,
@@ -287,7 +290,20 @@ fn camera_config(raw: &Spanned<RawCamera>, row: usize) -> Result<CameraConfig, S
     if pinhole.is_none() && camera.distortion.is_some() && !distortion.coefficients().is_empty() {
         return Err(missing("fx", "distortion is given, and is worth nothing without fx fy cx cy"));
     }
-    Ok(CameraConfig { fixed: camera.fixed, size, distortion, pinhole, row })
+    Ok(CameraConfig { fixed: camera.fixed, accuracy_px, size, distortion, pinhole, row })
+}
+
+fn accuracy(value: &Spanned<f64>, is_fixed: bool) -> Result<f64, Spanning> {
+    let px = *value.get_ref();
+    if !is_fixed {
+        return Err(bad(value, "accuracy_px", "fixed = true beside it: what is estimated has an accuracy of its own"));
+    }
+    let is_usable = px.is_finite() && px > 0.0;
+    if is_usable {
+        Ok(px)
+    } else {
+        Err(bad(value, "accuracy_px", "a positive number of pixels; an exact lens has none"))
+    }
 }
 
 enum PinholeProblem {

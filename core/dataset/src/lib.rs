@@ -116,6 +116,10 @@ pub struct Dataset {
 pub struct CameraInput {
     /// Whether the intrinsics are known and stay as they are.
     pub fixed: bool,
+    /// How good known intrinsics are: what they may displace points of the image by in each of their parameters, one standard
+    /// deviation, pixels; `None` where they are taken as exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy_px: Option<f64>,
     /// The known intrinsics, or where an estimate starts; always there when `fixed`.
     pub intrinsics: Option<Intrinsics>,
     /// The lens model to use; `brown_conrady` when `[camera]` names none. Its coefficients are those of `intrinsics`,
@@ -479,6 +483,7 @@ fn camera_input(
     }
     Ok(config.camera.as_ref().map(|camera| CameraInput {
         fixed: camera.fixed,
+        accuracy_px: camera.accuracy_px,
         intrinsics: image_size.and_then(|size| camera.intrinsics(size)),
         model: camera.distortion,
     }))

@@ -1,7 +1,7 @@
 //! The one way from a dataset folder to what a calibration is made from.
 
 use super::{CameraInput, Dataset};
-use handeye_estimate::{CameraKnowledge, Observations, ObservedView};
+use handeye_estimate::{CameraKnowledge, KnownLens, Observations, ObservedView};
 use handeye_geometry::targets::observation::Corners;
 
 impl CameraInput {
@@ -10,7 +10,10 @@ impl CameraInput {
         match camera {
             None => CameraKnowledge::NOTHING,
             Some(input) => match input.intrinsics {
-                Some(intrinsics) if input.fixed => CameraKnowledge::Fixed(intrinsics),
+                Some(intrinsics) if input.fixed => match input.accuracy_px {
+                    None => CameraKnowledge::Fixed(intrinsics),
+                    Some(accuracy_px) => CameraKnowledge::Near(KnownLens { intrinsics, accuracy_px }),
+                },
                 start => CameraKnowledge::Estimate { model: input.model, start },
             },
         }

@@ -300,6 +300,10 @@ fn camera(text: &mut Text, sizes: &BTreeMap<(u32, u32), usize>) {
         "{CHOICE}{:<32}# true: the numbers below are exact; false: the estimate starts there",
         "fixed ="
     ));
+    text.line(format_args!(
+        "{CHOICE}{:<32}# with fixed = true: how good they are, pixels; without it they are exact",
+        "accuracy_px = 0.5"
+    ));
     if let Some(((width, height), _)) = sizes.iter().max_by_key(|(_, count)| **count) {
         text.line(format_args!("{CHOICE}width = {width}"));
         text.line(format_args!("{CHOICE}height = {height}"));

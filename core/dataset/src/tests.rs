@@ -5,6 +5,7 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use sha2::{Digest as _, Sha256};
 
 use super::*;
+use handeye_estimate::CameraKnowledge;
 use handeye_files::digest::hex;
 use handeye_geometry::targets::Grid;
 
@@ -257,6 +258,24 @@ fn all_camera_models_are_read() {
 }
 
 #[test]
+fn the_accuracy_of_known_intrinsics_is_a_positive_number_of_pixels() {
+    let folder = Folder::new(TARGET, "", &["a.png"]);
+    let with = |fixed: bool, accuracy: &str| {
+        let lens = "model = \"none\"\nfx = 600\nfy = 600\ncx = 3.5\ncy = 2.5\n";
+        folder.write("dataset.toml", format!("{TARGET}[camera]\nfixed = {fixed}\naccuracy_px = {accuracy}\n{lens}"));
+    };
+    with(true, "0.5");
+    let camera = folder.read().camera.expect("a camera");
+    let knowledge = CameraInput::knowledge(Some(&camera));
+    assert!(matches!(knowledge, CameraKnowledge::Near(known) if known.accuracy_px == 0.5), "{knowledge:?}");
+    for (fixed, accuracy) in [(true, "0"), (true, "-1.0"), (true, "nan"), (false, "0.5")] {
+        with(fixed, accuracy);
+        let error = folder.error();
+        assert!(error.contains("accuracy_px") && error.contains("row 9"), "{fixed} {accuracy}: {error}");
+    }
+}
+
+#[test]
 fn the_input_hash_is_what_sha256sum_gives_and_does_not_depend_on_the_place() {
     let poses = "image,x,y,z,qx,qy,qz,qw\na.png,0,0,0,0,0,0,1\n";
     let make = || Folder::new(&format!("{TARGET}{ROBOT}"), poses, &["a.png"]);
@@ -279,7 +298,7 @@ fn what_is_written_reads_back_to_the_same_numbers() {
     let target = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
     let model = Distortion::Fisheye([1e-7, -0.25, 1.0 / 3.0, 1e20]);
     let intrinsics = Intrinsics { width: 8, height: 6, fx: 589.37, fy: 1e3, cx: 1.0 / 7.0, cy: 3.0, distortion: model };
-    let camera = CameraInput { fixed: true, intrinsics: Some(intrinsics), model };
+    let camera = CameraInput { fixed: true, accuracy_px: Some(0.3), intrinsics: Some(intrinsics), model };
     let pose = Pose::from_translation_xyzw([0.1, -1e-9, 3.0], [0.195832126, 0.036412615, 0.644503346, -0.738200065]);
     let names = ["images/0001.png", "b, \"c\".png"];
     let folder = Folder::new(

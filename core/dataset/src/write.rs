@@ -143,6 +143,10 @@ pub fn target_table(target: &TargetSpec) -> String {
 
 fn camera_table(camera: &CameraInput) -> String {
     let mut text = format!("\n[camera]\nfixed = {}\nmodel = \"{}\"\n", camera.fixed, camera.model.name());
+    if let Some(px) = camera.accuracy_px {
+        // Writing to a string cannot fail.
+        let _ok = writeln!(text, "accuracy_px = {px:?}").is_ok();
+    }
     if let Some(k) = &camera.intrinsics {
         let numbers = [("fx", k.fx), ("fy", k.fy), ("cx", k.cx), ("cy", k.cy)];
         // Writing to a string cannot fail.

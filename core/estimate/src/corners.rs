@@ -9,12 +9,13 @@ use super::{
     CalibrateError, CalibratedCamera, Fit, JointDepths, JointFit, LinkCovariances, Method, Observations, Options,
     ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
+use crate::given_lens;
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::consensus::Consensus;
 use crate::handeye::joint::{JointProblem, LensPrior, camera_from_target};
 use crate::handeye::motion::MIN_VIEWS;
 use crate::handeye::numbering::Turns;
-use crate::handeye::{HandEye, HandEyeError, Mode, PosePair};
+use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, determined};
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::progress::Work;
 use handeye_geometry::statistics::median_high;
@@ -35,8 +36,10 @@ pub fn calibrate(
     match method {
         Method::ClosedForm(name) => session.closed_form(name),
         Method::Joint => {
-            let refined = session.alone(options, work)?;
-            session.finish(refined, None, work)
+            let known = session.lens.known.map(|known| (known.intrinsics, known.information()));
+            let prior = known.as_ref().map(|(expected, information)| LensPrior { expected: *expected, information });
+            let refined = session.alone(prior, options, work)?;
+            session.finish(refined, prior, work)
         }
     }
 }
@@ -135,17 +138,22 @@ impl Session<'_> {
         refine::refine(&problem, &own, &self.lens, begin, options, work)
     }
 
-    /// The joint estimate of the session by itself, with the error that may be stated.
-    pub fn alone(&self, options: Options, work: &Work<'_>) -> Result<Refined, CalibrateError> {
-        let mut refined = self.refine(None, options, work)?;
+    /// The joint estimate of the session by itself, with what is known of its lens beforehand, and the error that may be stated.
+    pub fn alone(
+        &self,
+        prior: Option<LensPrior<'_>>,
+        options: Options,
+        work: &Work<'_>,
+    ) -> Result<Refined, CalibrateError> {
+        let mut refined = self.refine(prior, options, work)?;
         let fitted = self.fitted(&refined);
-        let problem = self.problem(&refined, &fitted, None);
+        let problem = self.problem(&refined, &fitted, prior);
         refined = refined.with_distortion(&problem, work)?;
         let fitted = self.fitted(&refined);
-        let as_drawn = JointProblem { board: &self.board, ..self.problem(&refined, &fitted, None) };
+        let as_drawn = JointProblem { board: &self.board, ..self.problem(&refined, &fitted, prior) };
         refined = refined.with_settled_print(&as_drawn, work)?;
         let fitted = self.fitted(&refined);
-        let problem = self.problem(&refined, &fitted, None);
+        let problem = self.problem(&refined, &fitted, prior);
         Ok(refined.stated(&problem, work)?)
     }
 
@@ -180,6 +188,10 @@ impl Session<'_> {
         take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
         if let Some(joint) = &mut calibration.joint {
             joint.arm = arm_fit(&problem, &refined.screened.solution, work)?;
+            joint.known_lens = self.lens.known;
+            let solution = &refined.screened.solution;
+            let at_half = given_lens::error_at_half_a_pixel_95_m(&problem, solution, work.cancel);
+            joint.error_at_half_a_pixel_95_m = determined(at_half)?.flatten();
         }
         Ok(calibration)
     }
@@ -273,7 +285,7 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
     Fit {
         camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px }),
         camera_fit: lens.fit,
-        lens_by_corners: (lens.free && !lens.is_bent()).then_some(lens.intrinsics),
+        lens_by_corners: (lens.free && lens.known.is_none() && !lens.is_bent()).then_some(lens.intrinsics),
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(corners_used))),
         views,
         ..Fit::default()
@@ -328,6 +340,8 @@ fn take_joint(
     calibration.rms_px = Some(solution.rms_px);
     let estimated = solution.free.warp || solution.free.scale;
     calibration.joint = Some(JointFit {
+        known_lens: None,
+        error_at_half_a_pixel_95_m: None,
         free: solution.free,
         covariance: solution.covariance.clone(),
         noise: solution.noise,

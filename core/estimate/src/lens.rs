@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::{CalibrateError, CameraFit, CameraKnowledge, Observations};
+use super::{CalibrateError, CameraFit, CameraKnowledge, KnownLens, Observations};
 use crate::detected_view::DetectedView;
 use crate::handeye::HandEyeError;
 use crate::intrinsics::{self, Bend, Found, IntrinsicsError, Options, Screened};
@@ -22,6 +22,8 @@ pub struct Lens {
     pub free: bool,
     /// The target as the corners show it; flat where the camera was given.
     pub shape: BoardShape,
+    /// What is known of it beforehand beside the views, where it is free.
+    pub known: Option<KnownLens>,
     /// What the corners say of an estimated camera; `None` where it was given.
     pub fit: Option<CameraFit>,
     /// The pose of each view that fits its corners best.
@@ -43,6 +45,15 @@ impl Lens {
     ) -> Result<Self, CalibrateError> {
         match observations.camera {
             CameraKnowledge::Fixed(intrinsics) => Self::given(intrinsics, observations, seen, work),
+            CameraKnowledge::Near(known) => {
+                let given = Self::given(known.intrinsics, observations, seen, work)?;
+                if !(known.accuracy_px > 0.0 && known.accuracy_px.is_finite()) {
+                    return Err(CalibrateError::LensAccuracy { accuracy_px: known.accuracy_px });
+                }
+                // The robot's motion is what tells more of it.
+                let free = observations.mode.is_some();
+                Ok(Self { free, known: Some(known).filter(|_| free), ..given })
+            }
             CameraKnowledge::Estimate { model, start } => {
                 work.report(Stage::Intrinsics, 0, 1);
                 let views: Vec<&Corners> = seen.iter().map(|s| s.corners).collect();
@@ -62,6 +73,7 @@ impl Lens {
                 Ok(Self {
                     intrinsics: found.intrinsics,
                     free: true,
+                    known: None,
                     shape: found.shape,
                     fit: Some(CameraFit::of(&found)),
                     camera_from_target: found.camera_from_target,
@@ -93,6 +105,7 @@ impl Lens {
         Ok(Self {
             intrinsics,
             free: false,
+            known: None,
             shape: BoardShape::FLAT,
             fit: None,
             camera_from_target: poses.iter().map(|pose| pose.best.camera_from_target).collect(),

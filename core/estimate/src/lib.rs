@@ -86,6 +86,7 @@ mod corners;
 pub mod corrected_arm;
 mod detected_view;
 pub mod diagnose;
+mod given_lens;
 pub mod handeye;
 pub mod intrinsics;
 mod lens;
@@ -123,7 +124,7 @@ use crate::uncertainty::overdispersion::Overdispersion;
 use crate::uncertainty::quality;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Camera, Pose, Target};
-pub use handeye_geometry::observations::{CameraKnowledge, DEFAULT_MODEL, Observations, ObservedView};
+pub use handeye_geometry::observations::{CameraKnowledge, DEFAULT_MODEL, KnownLens, Observations, ObservedView};
 use handeye_geometry::planar_pose::PoseError;
 use handeye_geometry::progress::{Stage, Work};
 use handeye_geometry::targets::bent::BoardShape;
@@ -273,6 +274,12 @@ pub enum CalibrateError {
     /// The camera could not be calibrated.
     #[error(transparent)]
     Intrinsics(#[from] IntrinsicsError),
+    /// The accuracy of a lens that is given is no length.
+    #[error("the lens given is said to be good to {accuracy_px} px: say a positive number of pixels")]
+    LensAccuracy {
+        /// What is said.
+        accuracy_px: f64,
+    },
     /// The target has no pose in a view.
     #[error(transparent)]
     Pose(#[from] PoseError),
@@ -477,6 +484,11 @@ pub struct JointFit {
     /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
     /// stays in the answer.
     pub robot_effect_px: f64,
+    /// What was known of the lens beforehand, where that is not all or nothing.
+    pub known_lens: Option<KnownLens>,
+    /// What the expected error (95 %) would be where it is stated if a lens that was taken as exact were only known to half a pixel,
+    /// metres; `None` where the lens is estimated.
+    pub error_at_half_a_pixel_95_m: Option<f64>,
     /// The shape of the target when it was estimated.
     pub shape: Option<ShapeEstimate>,
     /// Its size by the robot's motion; `None` where that says nothing of it.

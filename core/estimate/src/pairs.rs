@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 
 use super::{
-    CalibrateError, CalibratedCamera, CameraKnowledge, Fit, LinkCovariances, Method, Observations, Options, PoseFit,
-    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
+    CalibrateError, CalibratedCamera, CameraKnowledge, Fit, KnownLens, LinkCovariances, Method, Observations, Options,
+    PoseFit, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms,
 };
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::consensus::consensus;
@@ -36,7 +36,9 @@ pub fn calibrate(
     check_motion(mode, &pairs)?;
     let mut calibration = Fit {
         camera: match observations.camera {
-            CameraKnowledge::Fixed(intrinsics) => Some(CalibratedCamera { intrinsics, fixed: true, sigma_px: None }),
+            CameraKnowledge::Fixed(intrinsics) | CameraKnowledge::Near(KnownLens { intrinsics, .. }) => {
+                Some(CalibratedCamera { intrinsics, fixed: true, sigma_px: None })
+            }
             CameraKnowledge::Estimate { .. } => None,
         },
         methods: closed_forms(&pairs, work)?,

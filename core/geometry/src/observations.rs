@@ -1,6 +1,6 @@
 //! What a session saw, as an estimator is given it: who carries the camera, what is known of the lens, and one entry per image.
 
-use nalgebra::Isometry3;
+use nalgebra::{DMatrix, DVector, Isometry3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Distortion, Intrinsics};
@@ -97,6 +97,8 @@ impl From<&View> for ObservedView {
 pub enum CameraKnowledge {
     /// These intrinsics, taken as exact.
     Fixed(Intrinsics),
+    /// These intrinsics, as well as they are known.
+    Near(KnownLens),
     /// Intrinsics are estimated.
     Estimate {
         /// The lens model; its coefficients do not matter.
@@ -109,6 +111,40 @@ pub enum CameraKnowledge {
 impl CameraKnowledge {
     /// What is known when nothing is stated: intrinsics are estimated with [`DEFAULT_MODEL`].
     pub const NOTHING: Self = Self::Estimate { model: DEFAULT_MODEL, start: None };
+}
+
+/// A lens that is known to so many pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownLens {
+    /// The lens.
+    pub intrinsics: Intrinsics,
+    /// What it may displace points of the image by in each of its parameters, one standard deviation, RMS over the image, pixels; a
+    /// positive number.
+    pub accuracy_px: f64,
+}
+
+impl KnownLens {
+    /// Inverse of the covariance of its parameters, in the order of [`Intrinsics::parameters`]: a step `d` of them displaces the points
+    /// of the image by the length `√(dᵀ M d)`, RMS, and has the information `M / accuracy_px²`.
+    pub fn information(&self) -> DMatrix<f64> {
+        const ALONG: u32 = 12;
+        let lens = &self.intrinsics;
+        let count = lens.parameter_count();
+        let mut sum = DMatrix::zeros(count, count);
+        let mut seen = 0.0;
+        let along = |size: u32, k: u32| (f64::from(k) + 0.5) / f64::from(ALONG) * f64::from(size) - 0.5;
+        for (u, v) in (0..ALONG).flat_map(|u| (0..ALONG).map(move |v| (u, v))) {
+            let px = Vector2::new(along(lens.width, u), along(lens.height, v));
+            // Where the model has no ray nothing is displaced.
+            let Some(pixel) = lens.unproject(&px).ok().and_then(|ray| lens.linearise(&ray).ok()) else { continue };
+            let by = |axis: usize| DVector::from_fn(count, |k, _| pixel.by_parameters[k][axis]);
+            for by in [by(0), by(1)] {
+                sum.ger(1.0, &by, &by, 1.0);
+            }
+            seen += 1.0;
+        }
+        sum / (f64::max(seen, 1.0) * self.accuracy_px.powi(2))
+    }
 }
 
 /// Lens model that is estimated when none is named: what OpenCV estimates by default.
@@ -154,4 +190,21 @@ impl Noise {
         link_m: 0.0,
         compliance_rad: 0.0,
     };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_known_lens_displaces_points_by_its_accuracy() {
+        let intrinsics = Intrinsics { distortion: DEFAULT_MODEL, ..Intrinsics::pinhole(640, 480, 600.0) };
+        let information = KnownLens { intrinsics, accuracy_px: 0.5 }.information();
+        assert_eq!(information.shape(), (9, 9));
+        // A centre half a pixel off is one standard deviation; so is a focal length that moves points by half a pixel, RMS.
+        let of = |k: usize, step: f64| information[(k, k)].sqrt() * step;
+        assert!((of(2, 0.5) - 1.0).abs() < 1e-12 && (of(3, 0.5) - 1.0).abs() < 1e-12);
+        let rms = 640.0 / 12_f64.sqrt() / 600.0;
+        assert!((of(0, 0.5 / rms) - 1.0).abs() < 0.01, "{}", of(0, 0.5 / rms));
+    }
 }

@@ -166,6 +166,7 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
     text.push('\n');
     let camera = known.camera.as_ref().map(|camera| CameraInput {
         fixed: true,
+        accuracy_px: None,
         intrinsics: Some(camera.intrinsics),
         model: camera.intrinsics.distortion,
     });
@@ -213,6 +214,7 @@ pub fn plan_images(recording: &Recording, settings: &Settings, target: &(TargetS
     let camera = chosen_camera(recording, stream.size, settings).ok().and_then(|(camera, _)| camera);
     let camera = camera.map(|camera| CameraInput {
         fixed: false,
+        accuracy_px: None,
         intrinsics: Some(camera.intrinsics),
         model: camera.intrinsics.distortion,
     });

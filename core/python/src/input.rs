@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::placement::{ArmOfViews, PlacementError};
-use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, Observations as Observed, ObservedView};
+use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, KnownLens, Observations as Observed, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::observation::{Corner, Corners};
@@ -33,6 +33,7 @@ struct Description {
     target: Option<TargetSpec>,
     image_size: Option<(u32, u32)>,
     known: Option<Lens>,
+    known_px: Option<f64>,
     start: Option<Lens>,
     model: Option<String>,
     names: Vec<String>,
@@ -114,7 +115,7 @@ impl Observations {
         camera_from_target: Option<&[u8]>,
         joints: Option<&[u8]>,
     ) -> Result<Self, Failure> {
-        let Description { mode, target, image_size, known, start, model: lens_model, names, arm } =
+        let Description { mode, target, image_size, known, known_px, start, model: lens_model, names, arm } =
             serde_json::from_str(description).map_err(Failure::input)?;
         if let Some(target) = &target {
             target.check().map_err(Failure::input)?;
@@ -125,7 +126,10 @@ impl Observations {
         }
         let spec = target.unwrap_or(NO_TARGET);
         let camera = match (known, start) {
-            (Some(known), _) => CameraKnowledge::Fixed(known.intrinsics()?),
+            (Some(known), _) => match (known.intrinsics()?, known_px) {
+                (intrinsics, None) => CameraKnowledge::Fixed(intrinsics),
+                (intrinsics, Some(accuracy_px)) => CameraKnowledge::Near(KnownLens { intrinsics, accuracy_px }),
+            },
             (None, start) => {
                 let start = start.as_ref().map(Lens::intrinsics).transpose()?;
                 let stated = lens_model.as_deref().map(model).transpose()?;

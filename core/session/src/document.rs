@@ -236,6 +236,9 @@ impl SessionMeta {
         if camera.fixed && camera.intrinsics.is_none() {
             return Err(bad("camera", text!("is fixed and has no intrinsics")));
         }
+        if camera.accuracy_px.is_some_and(|px| !(px.is_finite() && px > 0.0)) {
+            return Err(bad("camera.accuracy_px", text!("is no positive number of pixels")));
+        }
         match camera.intrinsics.map(|k| k.validate()) {
             Some(Err(why)) => Err(bad("camera.intrinsics", why.into())),
             _ => Ok(()),

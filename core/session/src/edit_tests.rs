@@ -156,11 +156,11 @@ fn an_edit_that_does_not_fit_is_refused_with_the_reason() {
     }
     let small = TargetSpec::Chessboard(Grid { columns: 2, rows: 7, square_m: 0.01 });
     assert!(matches!(before.apply(&Edit::SetTarget(small)), Err(EditError::Bad { .. })));
-    let unknown_lens = CameraInput { fixed: true, intrinsics: None, model: Distortion::None };
+    let unknown_lens = CameraInput { fixed: true, accuracy_px: None, intrinsics: None, model: Distortion::None };
     assert!(matches!(before.apply(&Edit::SetCamera(Some(unknown_lens))), Err(EditError::Bad { .. })));
     let mut no_focus = Intrinsics::pinhole(24, 16, 20.0);
     no_focus.fx = f64::NAN;
-    let unusable = CameraInput { fixed: true, intrinsics: Some(no_focus), model: Distortion::None };
+    let unusable = CameraInput { fixed: true, accuracy_px: None, intrinsics: Some(no_focus), model: Distortion::None };
     assert!(matches!(before.apply(&Edit::SetCamera(Some(unusable))), Err(EditError::Bad { .. })));
 }
 

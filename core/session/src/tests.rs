@@ -25,7 +25,12 @@ pub(super) fn meta() -> SessionMeta {
         tool_version: "0.1.0".into(),
         mode: Mode::EyeInHand,
         target: TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 }),
-        camera: Some(CameraInput { fixed: false, intrinsics: Some(intrinsics), model: intrinsics.distortion }),
+        camera: Some(CameraInput {
+            fixed: true,
+            accuracy_px: Some(0.25),
+            intrinsics: Some(intrinsics),
+            model: intrinsics.distortion,
+        }),
         seeds: [("scene".to_owned(), u64::MAX)].into(),
         ground_truth: Some(GroundTruth::new(&links, Some(intrinsics))),
         arm: None,

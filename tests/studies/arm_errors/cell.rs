@@ -2,11 +2,12 @@
 
 use handeye_arm::Arm;
 use handeye_estimate::handeye::Mode;
+use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::observation::Corner;
 use handeye_geometry::targets::{Grid, TargetSpec};
 use handeye_simulate::lens;
 use handeye_simulate::links::{noise_twist, normal, shift_and_turn};
-use handeye_simulate::session::{Cone, camera};
+use handeye_simulate::session::{Cone, bent, camera};
 use nalgebra::{
     Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6,
 };
@@ -26,6 +27,53 @@ const TURNS: usize = 12;
 const CONE: Cone =
     Cone { tilt_deg: 40.0, roll_deg: 150.0, distance_m: 0.3..0.5, beside_m: 0.04, distance_first: false };
 
+/// What is wrong besides the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrong {
+    #[default]
+    Nothing,
+    /// The middle of the board is 2 mm off its edges.
+    Bent,
+    /// Its squares are 1.3 % larger or smaller than stated.
+    Square,
+    /// The principal point of the lens given is half a pixel off.
+    Lens,
+    /// The arm goes on to the nearest view that is left at 50 mm/s or 10°/s, whichever is slower, and its joints are read 80 ms after
+    /// the image.
+    Late,
+}
+
+impl Wrong {
+    pub const ALL: [(&str, Self); 4] =
+        [("bent", Self::Bent), ("square", Self::Square), ("lens-off", Self::Lens), ("late", Self::Late)];
+
+    /// The board as it is.
+    fn board(self, rng: &mut ChaCha8Rng) -> Vec<Point3<f64>> {
+        let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
+        match self {
+            Self::Bent => bent(&TARGET.points(), [0.002 * sign, 0.0], 1.0),
+            Self::Square => bent(&TARGET.points(), [0.0; 2], 1.0 + 0.013 * sign),
+            _ => TARGET.points(),
+        }
+    }
+
+    /// The lens that is given.
+    fn lens(self, rng: &mut ChaCha8Rng) -> Intrinsics {
+        let mut lens = camera();
+        if self == Self::Lens {
+            let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
+            lens.cx += 0.5 * azimuth.cos();
+            lens.cy += 0.5 * azimuth.sin();
+        }
+        lens
+    }
+}
+
+/// What the tip goes on by until its joints are read, metres.
+const LATE_M: f64 = 0.05 * 0.08;
+/// And radians.
+const LATE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0 * 0.08;
+
 /// An arm, what its controller believes, and where things are on and about it.
 pub struct Cell {
     pub real: Real,
@@ -39,10 +87,17 @@ pub struct Cell {
     /// `base_from_target`, or `tip_from_target`.
     target: Isometry3<f64>,
     pub tool: Isometry3<f64>,
+    wrong: Wrong,
+    /// The points of the board as they are.
+    board: Vec<Point3<f64>>,
+    /// The lens that is given.
+    pub lens: Intrinsics,
 }
 
 pub struct Taken {
     pub joints: Vec<f64>,
+    /// As the calibration is given them.
+    pub reported: Vec<f64>,
     pub corners: Vec<Corner>,
     /// Where the camera saw the target from, as it was.
     tip: Isometry3<f64>,
@@ -77,7 +132,13 @@ impl Cell {
             }
         };
         let tool = Isometry3::translation(0.0, 0.0, TOOL_M);
-        Self { real, believed, arm, mode, start, repeats, camera, target, tool }
+        let (wrong, board, lens) = (Wrong::Nothing, TARGET.points(), handeye_simulate::session::camera());
+        Self { real, believed, arm, mode, start, repeats, camera, target, tool, wrong, board, lens }
+    }
+
+    /// The same with something else wrong.
+    pub fn with(self, wrong: Wrong, rng: &mut ChaCha8Rng) -> Self {
+        Self { wrong, board: wrong.board(rng), lens: wrong.lens(rng), ..self }
     }
 
     /// Joint values that put the tip at a pose as the controller believes, within the ranges of the arm.
@@ -122,7 +183,30 @@ impl Cell {
                 taken.extend(self.view(rng));
             }
         }
+        if self.wrong == Wrong::Late {
+            self.read_late(&mut taken);
+        }
         taken
+    }
+
+    /// Joints as they are read when the arm has gone on towards the next view.
+    fn read_late(&self, taken: &mut [Taken]) {
+        let apart =
+            |a: &Taken, b: &Taken| -> f64 { a.joints.iter().zip(&b.joints).map(|(a, b)| (a - b).powi(2)).sum() };
+        for k in 1..taken.len() {
+            let nearest = (k..taken.len())
+                .min_by(|a, b| apart(&taken[k - 1], &taken[*a]).total_cmp(&apart(&taken[k - 1], &taken[*b])));
+            taken.swap(k, nearest.unwrap_or(k));
+        }
+        let joints: Vec<Vec<f64>> = taken.iter().map(|view| view.joints.clone()).collect();
+        for (view, next) in taken.iter_mut().zip(joints.iter().cycle().skip(1)) {
+            let way = next.iter().zip(&view.joints).map(|(to, from)| (to - from).sin().atan2((to - from).cos()));
+            let place = |joints: &[f64]| self.believed.forward(joints).translation.vector;
+            let turned = |joints: &[f64]| self.believed.forward(joints).rotation;
+            let part = LATE_M / (place(next) - place(&view.joints)).norm().max(LATE_M);
+            let part = part.min(LATE_RAD / turned(next).angle_to(&turned(&view.joints)).max(LATE_RAD));
+            view.reported = view.joints.iter().zip(way).map(|(from, way)| from + part * way).collect();
+        }
     }
 
     fn view(&self, rng: &mut ChaCha8Rng) -> Option<Taken> {
@@ -136,13 +220,12 @@ impl Cell {
         let tip = self.sent(&joints, rng);
         let pose = self.camera_from_target(&tip);
         let lens = camera();
-        let points = TARGET.points();
-        let corners = points.iter().enumerate().map(|(i, point)| {
+        let corners = self.board.iter().enumerate().map(|(i, point)| {
             let px = lens::pixel(&lens, &(pose * point))?;
             let noise = Vector2::new(normal(rng), normal(rng)) * CORNER_PX;
             lens::is_in_image(&lens, &px).then(|| Corner::new(i, px + noise))
         });
-        Some(Taken { joints, corners: corners.collect::<Option<_>>()?, tip })
+        Some(Taken { reported: joints.clone(), joints, corners: corners.collect::<Option<_>>()?, tip })
     }
 
     /// Where an arm before its work stands, a little off: some start finds every pose.
@@ -206,7 +289,7 @@ impl Cell {
 
     /// A point that the camera saw: in its frame, and in the base.
     pub fn point(&self, view: &Taken, rng: &mut ChaCha8Rng) -> (Point3<f64>, Point3<f64>) {
-        let corner: Point3<f64> = TARGET.points()[rng.random_range(0..TARGET.points().len())];
+        let corner: Point3<f64> = self.board[rng.random_range(0..self.board.len())];
         let in_camera: Point3<f64> = self.camera_from_target(&view.tip) * corner;
         (in_camera, self.camera_at(&view.tip, &self.camera) * in_camera)
     }

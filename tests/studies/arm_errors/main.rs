@@ -1,11 +1,12 @@
 //! What the errors of an arm do to a touched point, and what is left of them once the command is corrected.
 //!
-//!     cargo run --release -p handeye_studies --example arm_errors -- CSV|ARM [VIEWS] [lens] [guided] [unknown] [exact] [joints] [sessions=40] [KIND…]
+//!     cargo run --release -p handeye_studies --example arm_errors -- CSV|ARM [VIEWS] [lens] [guided] [unknown] [exact] [joints] [bent|square|lens-off|late] [accuracy=PX] [sessions=40] [KIND…]
 //!
 //! With a CSV of factory calibrations (its columns: `arm, model, link, x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad`) an arm moves by
 //! it, and its controller believes the numbers of the data sheet: one session an arm and a set-up. With `joints` the joints give way
 //! under 2 kg and have gears as well; with `exact` the arms are as their data sheets have them. With the name of an arm (`ur5e`,
-//! `panda`, `xarm6`) errors of each kind are drawn, one arm a session.
+//! `panda`, `xarm6`) errors of each kind are drawn, one arm a session; with `bent`, `square`, `lens-off` or `late` something else is wrong
+//! as well. `accuracy` is what is said of the lens that is given, which is else taken as exact.
 //!
 //! Corners have 0.1 px of noise, the arm repeats to 0.02 mm and 0.005°. A tool of 120 mm, whose tip was found by the same arm about one
 //! point, is sent to points that the camera saw; the distance between the two is printed, RMS over 40 points a session. Beside it
@@ -29,7 +30,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use cell::Cell;
+use cell::{Cell, Wrong};
 use chain::model;
 use real::{Kind, Real};
 use session::{Asked, Touched, Unknown, session, unknown};
@@ -54,39 +55,43 @@ fn run() -> Result<(), Failure> {
     let given = |word: &str| arguments.iter().any(|argument| argument == word);
     let what = arguments.first().ok_or("which CSV of arms, or which arm?")?;
     let views: usize = arguments.get(1).map_or(Ok(20), |text| text.parse())?;
-    let asked = Asked { views, free_lens: given("lens"), guided: given("guided"), of_links: true };
+    let accuracy_px = arguments.iter().find_map(|argument| argument.strip_prefix("accuracy=")).map(str::parse);
+    let accuracy_px = accuracy_px.transpose()?;
+    let asked = Asked { views, free_lens: given("lens"), accuracy_px, guided: given("guided"), of_links: true };
     if Path::new(what).extension().is_some_and(|ending| ending == "csv") {
         return of_file(what, asked, given("exact"), given("joints"));
     }
     let sessions = arguments.iter().find_map(|argument| argument.strip_prefix("sessions="));
     let sessions: u64 = sessions.map_or(Ok(40), str::parse)?;
+    let wrong = Wrong::ALL.into_iter().find(|(name, _)| given(name)).map(|(_, wrong)| wrong).unwrap_or_default();
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| given(kind.name())).collect();
     let kinds = if kinds.is_empty() { Kind::ALL.to_vec() } else { kinds };
     if given("unknown") {
-        of_unknown(what, asked, sessions, &kinds);
+        of_unknown((what, wrong), asked, sessions, &kinds);
     } else {
-        of_drawn(what, asked, sessions, &kinds);
+        of_drawn((what, wrong), asked, sessions, &kinds);
     }
     Ok(())
 }
 
 /// A cell with an arm whose errors are drawn.
-fn drawn(name: &str, kind: Kind, mode: Mode, seed: u64) -> Result<Cell, Failure> {
+fn drawn((name, wrong): (&str, Wrong), kind: Kind, mode: Mode, seed: u64) -> Result<Cell, Failure> {
     let model = model(name)?;
-    let real = Real::draw(kind, &model, &mut ChaCha8Rng::seed_from_u64(seed));
-    Ok(Cell::new(name, model, real, kind.repeats(), mode))
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let real = Real::draw(kind, &model, rng);
+    Ok(Cell::new(name, model, real, kind.repeats(), mode).with(wrong, rng))
 }
 
 /// Arms of which the program is not told what they are.
-fn of_unknown(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
+fn of_unknown(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
         println!(
-            "\n{name}, chain not known, {set_up}, {} views\n\n| kind | sessions | from that of many views mm | from the true one mm | stated mm | within | within of the true one |\n| --- | --- | --- | --- | --- | --- | --- |",
+            "\n{name}, {wrong:?}, chain not known, {set_up}, {} views\n\n| kind | sessions | from that of many views mm | from the true one mm | stated mm | within | within of the true one |\n| --- | --- | --- | --- | --- | --- | --- |",
             asked.views
         );
         for kind in kinds {
             let one = |seed: u64| {
-                let cell = drawn(name, *kind, mode, seed)?;
+                let cell = drawn(what, *kind, mode, seed)?;
                 unknown(&cell, Asked { of_links: kind.is_of_links(), ..asked }, 1000 + seed)
             };
             let sessions: Vec<Result<Unknown, Failure>> = (0..count).into_par_iter().map(one).collect();
@@ -147,16 +152,16 @@ fn of_file(path: &str, asked: Asked, exact: bool, joints: bool) -> Result<(), Fa
 }
 
 /// Arms with errors of each kind, a line a kind.
-fn of_drawn(name: &str, asked: Asked, count: u64, kinds: &[Kind]) {
+fn of_drawn(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kinds: &[Kind]) {
     for (set_up, mode) in SET_UPS {
         println!(
-            "\n{name}, {set_up}, {} views, lens {}\n\n{HEADER}",
+            "\n{name}, {wrong:?}, {set_up}, {} views, lens {}\n\n{HEADER}",
             asked.views,
             if asked.free_lens { "estimated" } else { "known" }
         );
         for kind in kinds {
             let one = |seed: u64| {
-                let cell = drawn(name, *kind, mode, seed)?;
+                let cell = drawn(what, *kind, mode, seed)?;
                 session(&cell, Asked { of_links: kind.is_of_links(), ..asked }, 1000 + seed)
             };
             let sessions: Vec<Result<Touched, Failure>> = (0..count).into_par_iter().map(one).collect();

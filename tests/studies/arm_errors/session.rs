@@ -7,11 +7,10 @@ use handeye_estimate::diagnose::{Calibration, calibrate_with};
 use handeye_estimate::handeye::HandEye;
 use handeye_estimate::handeye::joint::{ArmErrors, LEVELS_OF_ARMS, LinkError, arm_parameters};
 use handeye_estimate::placement::{ArmOfViews, JointView, Placement, place_checked};
-use handeye_estimate::{ArmFit, CameraKnowledge, Method, Observations, ObservedView, Options};
+use handeye_estimate::{ArmFit, CameraKnowledge, KnownLens, Method, Observations, ObservedView, Options};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_simulate::links::shift_and_turn;
-use handeye_simulate::session::camera;
 use nalgebra::{DMatrix, DVector, Isometry3, Translation3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -40,6 +39,8 @@ pub struct Touched {
 pub struct Asked {
     pub views: usize,
     pub free_lens: bool,
+    /// What is said of the lens that is given.
+    pub accuracy_px: Option<f64>,
     /// Chosen by guided capture, not at random.
     pub guided: bool,
     /// Whether the chain is all that is wrong with the arm.
@@ -47,7 +48,7 @@ pub struct Asked {
 }
 
 pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure> {
-    let Asked { views, free_lens, guided, of_links } = asked;
+    let Asked { views, free_lens, guided, of_links, .. } = asked;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let placed = Placed::of(cell)?;
     let taken = if guided {
@@ -58,7 +59,10 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
     if taken.len() < if guided { 10 } else { views } {
         return Err(format!("the arm does not reach enough views: {}", taken.len()).into());
     }
-    let (observations, of_views) = observed(cell, &placed, &taken, free_lens);
+    let (mut observations, of_views) = observed(cell, &placed, &taken, free_lens);
+    if let (CameraKnowledge::Fixed(intrinsics), Some(accuracy_px)) = (observations.camera, asked.accuracy_px) {
+        observations.camera = CameraKnowledge::Near(KnownLens { intrinsics, accuracy_px });
+    }
     let calibrate = |method| {
         let wanted = FindingOptions::default().with_arm(Some(&of_views));
         calibrate_with(&observations, method, Options::default(), &wanted, &CancelToken::default())
@@ -190,8 +194,8 @@ fn reported(cell: &Cell, joints: &[f64]) -> Pose<Base, Tip> {
 /// What the estimator is given: corners, reported poses, joint values, and the arm that the program knows.
 pub fn observed(cell: &Cell, placed: &Placed, taken: &[Taken], free_lens: bool) -> (Observations, ArmOfViews) {
     let view = |(i, taken): (usize, &Taken)| {
-        let pose = reported(cell, &taken.joints);
-        let tip_from_joints = placed.arm.tip_from_joints(&pose, &taken.joints).unwrap_or_default();
+        let pose = reported(cell, &taken.reported);
+        let tip_from_joints = placed.arm.tip_from_joints(&pose, &taken.reported).unwrap_or_default();
         ObservedView {
             tip_from_joints,
             ..ObservedView::new(format!("{i}"), Some(pose), Some(taken.corners.clone().into()))
@@ -200,14 +204,14 @@ pub fn observed(cell: &Cell, placed: &Placed, taken: &[Taken], free_lens: bool) 
     let observations = Observations {
         mode: Some(cell.mode),
         target: TARGET,
-        image_size: (camera().width, camera().height),
-        camera: if free_lens { CameraKnowledge::NOTHING } else { CameraKnowledge::Fixed(camera()) },
+        image_size: (cell.lens.width, cell.lens.height),
+        camera: if free_lens { CameraKnowledge::NOTHING } else { CameraKnowledge::Fixed(cell.lens) },
         views: taken.iter().enumerate().map(view).collect(),
     };
     let of_views = ArmOfViews {
         placement: Placement { arm: placed.arm.clone(), misses: vec![(0.0, 0.0); taken.len()] },
         tool_m: cell.tool.translation.vector.into(),
-        joints_rad: taken.iter().map(|taken| Some(taken.joints.clone())).collect(),
+        joints_rad: taken.iter().map(|taken| Some(taken.reported.clone())).collect(),
     };
     (observations, of_views)
 }

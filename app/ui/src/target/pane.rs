@@ -52,6 +52,14 @@ fn mode_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     );
 }
 
+/// A number of pixels as it is shown or typed.
+fn pixels(text: &str) -> Option<f64> {
+    text.trim().trim_start_matches('±').trim_end_matches("px").trim().parse().ok()
+}
+
+/// Intrinsics that are worse are better estimated, pixels.
+const MOST_PX: f64 = 20.0;
+
 fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let camera = model.document().meta.camera;
@@ -59,16 +67,19 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     form::heading_ui(ui, tr!(language, "Camera intrinsics"));
     let choices = [
         (false, tr!(language, "Estimate"), tr!(language, "From the captures")),
-        (true, tr!(language, "Fixed"), tr!(language, "Known from an earlier calibration, and taken as exact")),
+        (true, tr!(language, "Fixed"), tr!(language, "Known from an earlier calibration, as well as you say")),
     ];
     if let Some(fixed) = form::choice_ui(ui, fixed, &choices) {
         let intrinsics = start(model);
         outbox.send(session::Command::SetCamera(Some(match camera {
             Some(camera) => CameraInput { fixed, intrinsics: camera.intrinsics.or(Some(intrinsics)), ..camera },
-            None => CameraInput { fixed, intrinsics: Some(intrinsics), model: intrinsics.distortion },
+            None => {
+                let model = intrinsics.distortion;
+                CameraInput { fixed, accuracy_px: None, intrinsics: Some(intrinsics), model }
+            }
         })));
     }
-    let Some(CameraInput { intrinsics: Some(before), .. }) = camera.filter(|camera| camera.fixed) else {
+    let Some(CameraInput { intrinsics: Some(before), accuracy_px, .. }) = camera.filter(|camera| camera.fixed) else {
         parts::hint_ui(ui, tr!(language, "Focal lengths, principal point and lens are estimated from the captures."));
         return;
     };
@@ -90,8 +101,24 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         });
     }
     lens_ui(ui, &mut now, language);
-    if now != before {
-        let known = CameraInput { fixed: true, intrinsics: Some(now), model: now.distortion };
+    let mut accuracy = accuracy_px.unwrap_or(0.0);
+    form::row_ui(ui, tr!(language, "Accuracy"), |ui| {
+        let exact = tr!(language, "exact");
+        let shown = move |px: f64, _| if px > 0.0 { format!("± {px:.2} px") } else { exact.to_owned() };
+        let value = DragValue::new(&mut accuracy)
+            .speed(0.01)
+            .range(0.0..=MOST_PX)
+            .custom_formatter(shown)
+            .custom_parser(pixels);
+        number_ui(ui, tr!(language, "Accuracy of the intrinsics"), value).on_hover_text(tr!(
+            language,
+            "By how much they may displace points of the image, one standard deviation; half a pixel is usual of a data sheet or \
+             another program. The expected error counts it. At 0 they are taken as exact."
+        ));
+    });
+    let accuracy = Some(accuracy).filter(|px| *px > 0.0);
+    if now != before || accuracy != accuracy_px {
+        let known = CameraInput { fixed: true, accuracy_px: accuracy, intrinsics: Some(now), model: now.distortion };
         outbox.send(session::Command::SetCamera(Some(known)));
     }
     if let Err(error) = now.validate() {

@@ -183,7 +183,7 @@ pub fn calibrate_sharing_lens<'a>(
     }
     let mut alone = Vec::with_capacity(sessions.len());
     for (session, prepared) in sessions.iter().zip(&prepared) {
-        let refined = prepared.alone(options, work).map_err(|error| session.fails(error))?;
+        let refined = prepared.alone(None, options, work).map_err(|error| session.fails(error))?;
         alone.push(fitted(prepared, refined, None, None, work).map_err(|error| session.fails(error))?);
     }
     let agreement = agreement::test(sessions, &alone).ok_or(SharedLensError::NoLens)?;

@@ -20,7 +20,7 @@ use crate::clearance::travel;
 use handeye_arm::JointValues;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::handeye::joint::ViewModel;
-use handeye_estimate::{self as estimate, CameraKnowledge, Method, Observations};
+use handeye_estimate::{self as estimate, CameraKnowledge, KnownLens, Method, Observations};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::progress::CancelToken;
@@ -156,7 +156,9 @@ impl RoughAnswer {
 /// The lens that is known or, where none is, a usual one: 53° wide, without distortion.
 fn lens(observations: &Observations) -> Intrinsics {
     match observations.camera {
-        CameraKnowledge::Fixed(intrinsics) | CameraKnowledge::Estimate { start: Some(intrinsics), .. } => intrinsics,
+        CameraKnowledge::Fixed(intrinsics)
+        | CameraKnowledge::Near(KnownLens { intrinsics, .. })
+        | CameraKnowledge::Estimate { start: Some(intrinsics), .. } => intrinsics,
         CameraKnowledge::Estimate { start: None, .. } => {
             let (width, height) = observations.image_size;
             let [fx, cx, cy] = [f64::from(width), f64::from(width) / 2.0 - 0.5, f64::from(height) / 2.0 - 0.5];

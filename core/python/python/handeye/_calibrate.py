@@ -28,6 +28,7 @@ def calibrate(
     camera_from_target: Any = None,
     image_size: Optional[Tuple[int, int]] = None,
     intrinsics: Optional[Intrinsics] = None,
+    intrinsics_accuracy_px: Optional[float] = None,
     intrinsics_start: Optional[Intrinsics] = None,
     lens_model: Optional[str] = None,
     mode: Optional[str] = None,
@@ -65,7 +66,10 @@ def calibrate(
     image_size
         (width, height) in pixels.
     intrinsics
-        The camera, where it is known: taken as exact. Otherwise it is estimated.
+        The camera, where it is known: taken as exact, or as well as `intrinsics_accuracy_px` says. Otherwise it is estimated.
+    intrinsics_accuracy_px
+        What `intrinsics` may displace points of the image by, one standard deviation, pixels; half a pixel is usual of a data
+        sheet or another program. They then follow the views as far as these know more, and the expected error counts it.
     intrinsics_start
         Where that estimate starts; found from the views when left out.
     lens_model
@@ -112,8 +116,8 @@ def calibrate(
         The arm of a data set is not used, or the controller counts with another chain than the arm's.
     """
     observations = _observations(
-        dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics, intrinsics_start,
-        lens_model, mode, names, joints, arm,
+        dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics,
+        intrinsics_accuracy_px, intrinsics_start, lens_model, mode, names, joints, arm,
     )
     if dataset is not None:
         _warn_of_unused(observations.joints_unused)
@@ -139,6 +143,7 @@ def doctor(
     camera_from_target: Any = None,
     image_size: Optional[Tuple[int, int]] = None,
     intrinsics: Optional[Intrinsics] = None,
+    intrinsics_accuracy_px: Optional[float] = None,
     intrinsics_start: Optional[Intrinsics] = None,
     lens_model: Optional[str] = None,
     mode: Optional[str] = None,
@@ -169,8 +174,8 @@ def doctor(
         Joint values are not used, because they do not belong to the poses: which of the two is wrong is what it looks for.
     """
     observations = _observations(
-        dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics, intrinsics_start,
-        lens_model, mode, names, joints, arm,
+        dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics,
+        intrinsics_accuracy_px, intrinsics_start, lens_model, mode, names, joints, arm,
     )
     _warn_of_unused(observations.joints_unused)
     return Diagnosis._of(*_handeye.diagnose(observations, goal_mm, progress))
@@ -190,6 +195,7 @@ def _observations(
     camera_from_target: Any,
     image_size: Optional[Tuple[int, int]],
     intrinsics: Optional[Intrinsics],
+    intrinsics_accuracy_px: Optional[float],
     intrinsics_start: Optional[Intrinsics],
     lens_model: Optional[str],
     mode: Optional[str],
@@ -201,8 +207,8 @@ def _observations(
         rest = {
             "corners": corners, "corner_ids": corner_ids, "target": target, "base_from_tip": base_from_tip,
             "camera_from_target": camera_from_target, "image_size": image_size, "intrinsics": intrinsics,
-            "intrinsics_start": intrinsics_start, "lens_model": lens_model, "mode": mode, "names": names,
-            "joints": joints, "arm": arm,
+            "intrinsics_accuracy_px": intrinsics_accuracy_px, "intrinsics_start": intrinsics_start, "lens_model": lens_model,
+            "mode": mode, "names": names, "joints": joints, "arm": arm,
         }
         given = [name for name, value in rest.items() if value is not None]
         if not isinstance(dataset, Dataset):
@@ -228,6 +234,8 @@ def _observations(
         raise InputError("image_size is missing: (width, height) in pixels")
     if intrinsics is not None and (intrinsics_start is not None or lens_model is not None):
         raise InputError("intrinsics are known and not estimated: leave intrinsics_start and lens_model out")
+    if intrinsics_accuracy_px is not None and (intrinsics is None or not intrinsics_accuracy_px > 0):
+        raise InputError("intrinsics_accuracy_px is a positive number of pixels, and goes with intrinsics")
     if (joints is None) != (arm is None):
         given, missing = ("joints", "arm") if arm is None else ("arm", "joints")
         raise InputError(
@@ -260,6 +268,7 @@ def _observations(
         "target": None if target is None else target._document(),
         "image_size": None if image_size is None else [int(side) for side in image_size],
         "known": None if intrinsics is None else intrinsics._document(),
+        "known_px": intrinsics_accuracy_px,
         "start": None if intrinsics_start is None else intrinsics_start._document(),
         "model": lens_model,
         "names": [str(n) for n in names] if names is not None else [f"view {i}" for i in range(max(counts.values()))],

@@ -54,6 +54,11 @@ fn called(name: &'static str, language: Language) -> &'static str {
         "heldout_rms" => tr!(language, "held-out RMS"),
         "heldout_rms_corrected" => tr!(language, "held-out RMS, corrected"),
         "fold_radius" => tr!(language, "radius of the fold"),
+        "expected_error_at_half_a_pixel" => {
+            tr!(language, "expected error if the lens is good to half a pixel (95 %)")
+        }
+        "lens_accuracy" => tr!(language, "accuracy of the lens given"),
+        "lens_off" => tr!(language, "lens off by (RMS)"),
         "image_reach" => tr!(language, "reach of the image"),
         "field_sigma" => tr!(language, "σ of errors by position"),
         "field_sigma_angle" => tr!(language, "σ of errors of the angle by position"),

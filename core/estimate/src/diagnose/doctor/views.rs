@@ -8,7 +8,7 @@ use crate::handeye::numbering::Turns;
 use crate::handeye::{Mode, subset};
 use crate::intrinsics::evidence::{Scatter, Score, scatter};
 use crate::intrinsics::{self, Options, SeenView};
-use crate::{CameraKnowledge, Observations, ObservedView, resolution};
+use crate::{CameraKnowledge, KnownLens, Observations, ObservedView, resolution};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::planar_pose::refine::refine;
@@ -131,7 +131,7 @@ impl SessionViews {
             table: in_fit.iter().map(row).collect(),
             not_finite,
             intrinsics: None,
-            lens_free: matches!(observations.camera, CameraKnowledge::Estimate { .. }),
+            lens_free: !matches!(observations.camera, CameraKnowledge::Fixed(_)),
             corner_px: None,
             form_information: DMatrix::zeros(0, 0),
             form_gradient: DVector::zeros(0),
@@ -233,6 +233,12 @@ impl SessionViews {
             });
         }
         self.take_form(&scores, count);
+        if let CameraKnowledge::Near(known) = observations.camera {
+            // The equations are linear at the lens given, which what is known of it pulls to.
+            let information = known.information();
+            let mut of_lens = self.form_information.view_mut((0, 0), information.shape());
+            of_lens += information;
+        }
         Ok(())
     }
 
@@ -330,7 +336,7 @@ fn board(points: &[Point3<f64>]) -> ([Point3<f64>; 4], Matrix6<f64>) {
 /// The camera given, or found from the corners alone: the robot may be what is wrong.
 fn camera_of(observations: &Observations, views: &[Corners]) -> Result<Intrinsics, Text> {
     match observations.camera {
-        CameraKnowledge::Fixed(intrinsics) => Ok(intrinsics),
+        CameraKnowledge::Fixed(intrinsics) | CameraKnowledge::Near(KnownLens { intrinsics, .. }) => Ok(intrinsics),
         CameraKnowledge::Estimate { model, start } => {
             let chosen = subset::spread(views.len(), subset::MOST_VIEWS);
             let chosen: Vec<SeenView<'_>> = chosen.into_iter().map(|i| SeenView::unweighted(&views[i])).collect();

@@ -86,6 +86,8 @@ pub enum FindingCode {
     RobotNoise,
     /// The lens model folds back within the image, beyond where the target was seen.
     LensFolds,
+    /// The lens was given and taken as exact, and the answer hangs on it.
+    LensTakenAsExact,
     /// The robot's errors depend on where it stands.
     RobotField,
     /// The points of the target are not where its drawing has them.

@@ -10,6 +10,7 @@ mod answer;
 mod depth;
 mod direction;
 mod finding;
+mod given_lens;
 pub(crate) mod outliers;
 mod shared_lens;
 mod views;
@@ -71,6 +72,7 @@ pub fn findings(
     if let Some(calibration) = calibration {
         found.extend(answer::findings(calibration, options));
         found.extend(direction::finding(calibration));
+        found.extend(given_lens::findings(calibration));
         found.extend(shared_lens::finding(calibration));
         found.extend(crate::diagnose::findings::outliers::findings(calibration));
     }

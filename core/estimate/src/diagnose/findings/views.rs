@@ -203,7 +203,9 @@ fn coverage(observations: &Observations, seen: &[&ObservedView]) -> Option<Findi
     };
     // A lens that is given needs no coverage; a lens that is estimated is only known where something was seen.
     let (severity, why) = match observations.camera {
-        CameraKnowledge::Fixed(_) => (Severity::Info, text!("The intrinsics are given, so this matters little")),
+        CameraKnowledge::Fixed(_) | CameraKnowledge::Near(_) => {
+            (Severity::Info, text!("The intrinsics are given, so this matters little"))
+        }
         CameraKnowledge::Estimate { .. } => {
             (Severity::Advice, text!("Bring the board there: the lens is only known where it was seen"))
         }

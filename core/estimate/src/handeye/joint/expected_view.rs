@@ -21,6 +21,7 @@ use crate::arm_fit::BesideArm;
 use crate::handeye::{HandEye, Mode};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
+use handeye_geometry::observations::KnownLens;
 use handeye_geometry::targets::TargetSpec;
 use handeye_geometry::targets::bent::{BoardPoints, BoardShape};
 use handeye_geometry::targets::observation::{Corner, View};
@@ -56,6 +57,8 @@ pub struct ViewModel {
     shape: BoardShape,
     field: Option<PoseDependentError>,
     arm: Option<ArmErrors>,
+    /// What is known of a free lens beforehand.
+    lens: Option<KnownLens>,
     layout: Layout,
 }
 
@@ -70,6 +73,7 @@ impl ViewModel {
     /// That of a joint estimate with a robot and a camera; `None` for any other calibration.
     pub fn new(calibration: &Fit, target: &TargetSpec) -> Option<Self> {
         let joint = calibration.joint.as_ref()?;
+        let lens = joint.known_lens;
         let intrinsics = calibration.intrinsics()?;
         let free = Free { arm: false, depth: false, ..joint.free };
         let field = joint.field.clone();
@@ -87,6 +91,7 @@ impl ViewModel {
             shape: joint.shape.map_or_else(BoardShape::default, |estimate| estimate.shape),
             field,
             arm: None,
+            lens,
             layout,
         })
     }
@@ -107,6 +112,7 @@ impl ViewModel {
             shape,
             field: None,
             arm: Some(arm.errors.clone()),
+            lens: calibration.joint.as_ref()?.known_lens,
             layout,
         })
     }
@@ -122,7 +128,18 @@ impl ViewModel {
         let free = Free { intrinsics: free_lens, ..Free::default() };
         let layout = Layout { form: free.form().count(&intrinsics), field: 0, arm: [0; KINDS] };
         let board = BoardPoints::new(&target.points());
-        Self { hand_eye, intrinsics, free, noise, board, shape: BoardShape::default(), field: None, arm: None, layout }
+        Self {
+            hand_eye,
+            intrinsics,
+            free,
+            noise,
+            board,
+            shape: BoardShape::default(),
+            field: None,
+            arm: None,
+            lens: None,
+            layout,
+        }
     }
 
     /// The same with other noise levels.
@@ -182,10 +199,16 @@ impl ViewModel {
         for (places, level) in self.layout.effects().into_iter().zip(levels_of_effects(&self.noise)) {
             sigma[places].fill(level);
         }
-        DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
+        let mut prior = DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
             sigma.len(),
             sigma.iter().map(|sigma| sigma.max(f64::MIN_POSITIVE.sqrt()).powi(-2)),
-        ))
+        ));
+        if let Some(known) = self.lens.filter(|_| self.free.intrinsics) {
+            let information = known.information();
+            let mut of_lens = prior.view_mut((Layout::FORM_AT, Layout::FORM_AT), information.shape());
+            of_lens += information;
+        }
+        prior
     }
 
     /// The pose of the target in a view, and the equations of the view at it; `None` where `corners`, by their index, do

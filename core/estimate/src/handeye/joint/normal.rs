@@ -26,7 +26,7 @@ struct SharedPrior {
 
 /// What is known of the lens beforehand.
 #[derive(Debug, Clone)]
-struct KnownLens {
+struct PriorOfLens {
     /// Current values minus those expected.
     offset: DVector<f64>,
     information: DMatrix<f64>,
@@ -40,7 +40,7 @@ pub struct System {
     pub layout: Layout,
     /// Of all but the lens, and the effects whose priors are their levels.
     priors: Vec<SharedPrior>,
-    known_lens: Option<KnownLens>,
+    known_lens: Option<PriorOfLens>,
     /// Slopes of the field and errors of the arm, as they are now.
     pub effects: Vec<f64>,
     /// Sum of `Jsᵀ Js` over the poses' parts of the views, upper triangle.
@@ -142,7 +142,7 @@ impl System {
         for p in self.known(noise) {
             known[(p.index, p.index)] += p.precision;
         }
-        if let Some(KnownLens { information, .. }) = &self.known_lens {
+        if let Some(PriorOfLens { information, .. }) = &self.known_lens {
             let mut of_lens = known.view_mut((Layout::FORM_AT, Layout::FORM_AT), information.shape());
             of_lens += information;
         }
@@ -174,7 +174,7 @@ impl System {
             matrix[(p.index, p.index)] += p.precision;
             gradient[p.index] += p.precision * p.offset;
         }
-        if let Some(KnownLens { offset, information }) = &self.known_lens {
+        if let Some(PriorOfLens { offset, information }) = &self.known_lens {
             let mut of_lens = matrix.view_mut((Layout::FORM_AT, Layout::FORM_AT), information.shape());
             of_lens += information;
             let mut of_lens = gradient.rows_mut(Layout::FORM_AT, offset.len());
@@ -230,11 +230,11 @@ fn priors(problem: &JointProblem<'_>, state: &State) -> Vec<SharedPrior> {
     depth.filter(|_| problem.free.depth).chain(scale).collect()
 }
 
-fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<KnownLens> {
+fn known_lens(problem: &JointProblem<'_>, state: &State) -> Option<PriorOfLens> {
     let prior = problem.lens_prior.filter(|_| problem.free.intrinsics)?;
     let (now, expected) = (state.intrinsics.parameters(), prior.expected.parameters());
     let offset = DVector::from_iterator(now.len(), now.iter().zip(&expected).map(|(now, expected)| now - expected));
-    Some(KnownLens { offset, information: prior.information.clone() })
+    Some(PriorOfLens { offset, information: prior.information.clone() })
 }
 
 fn linearise(problem: &JointProblem<'_>, state: &State, index: usize) -> Result<ViewBlock, HandEyeError> {

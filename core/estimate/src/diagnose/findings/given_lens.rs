@@ -1,0 +1,57 @@
+//! Findings on a lens that was given.
+
+use nalgebra::DVector;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use super::{Finding, FindingCode, Severity};
+use crate::diagnose::Calibration;
+use crate::resolution;
+use handeye_wording::{shown, text};
+
+/// Lenses that are as good as is said of them and are called another one.
+const FALSE_ALARM: f64 = 1e-3;
+
+pub fn findings(calibration: &Calibration) -> impl Iterator<Item = Finding> {
+    taken_as_exact(calibration).into_iter().chain(beyond_accuracy(calibration))
+}
+
+/// How many times what is stated the error of a lens that is good to half a pixel is for what is stated to hang on it: by its square it
+/// is then as much again.
+const MUCH: f64 = std::f64::consts::SQRT_2;
+
+/// What is stated hangs on the lens.
+fn taken_as_exact(calibration: &Calibration) -> Option<Finding> {
+    let joint = calibration.joint.as_ref()?;
+    let (at_half_m, stated_m) = (joint.error_at_half_a_pixel_95_m?, calibration.error_95_m(&joint.reference_point)?);
+    if at_half_m < MUCH * stated_m || !resolution::is_resolved(at_half_m, 0.0) {
+        return None;
+    }
+    let text = text!(
+        "The lens given is taken as exact. If it is good to half a pixel, as those of data sheets and other programs are, the expected \
+         error is {error} mm. Say how good it is (`accuracy_px` in `[camera]`, *Accuracy* of the intrinsics), or let it be estimated.",
+        error = shown(at_half_m * 1e3, 2)
+    );
+    let finding = Finding::new(FindingCode::LensTakenAsExact, Severity::Info, text);
+    Some(finding.with("expected_error_at_half_a_pixel", at_half_m * 1e3, "mm"))
+}
+
+/// The lens that fits is farther from the one given than is said of it.
+fn beyond_accuracy(calibration: &Calibration) -> Option<Finding> {
+    let (known, now) = (calibration.joint.as_ref()?.known_lens?, calibration.intrinsics()?);
+    let parameters = now.parameters().into_iter().zip(known.intrinsics.parameters());
+    let off = DVector::from_vec(parameters.map(|(now, given)| now - given).collect());
+    let squared = off.dot(&(known.information() * &off));
+    let most = ChiSquared::new(off.len() as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - FALSE_ALARM));
+    if squared <= most {
+        return None;
+    }
+    let off_px = squared.sqrt() * known.accuracy_px;
+    let text = text!(
+        "The lens given is said to be good to {accuracy} px, and the one that fits displaces points of the image by {off} px, RMS. Give \
+         that of this camera at this image size, or let it be estimated.",
+        accuracy = shown(known.accuracy_px, 2),
+        off = shown(off_px, 2)
+    );
+    let finding = Finding::new(FindingCode::WrongIntrinsics, Severity::Warning, text);
+    Some(finding.with("lens_accuracy", known.accuracy_px, "px").with("lens_off", off_px, "px"))
+}

@@ -1,0 +1,90 @@
+use handeye_geometry::camera::Intrinsics;
+use handeye_geometry::observations::KnownLens;
+use handeye_geometry::progress::CancelToken;
+use handeye_simulate::session::{Setup, session};
+
+use crate::diagnose::findings::{Finding, FindingCode};
+use crate::diagnose::{Calibration, calibrate};
+use crate::handeye::Mode;
+use crate::{CalibrateError, CameraKnowledge, Method, Noise, Observations};
+
+/// A robot that repeats well, as industrial ones do.
+const NOISE: Noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
+
+/// Views of a camera of which this is said, and the true place of a point that it saw.
+fn solved(mode: Mode, seed: u64, camera: impl Fn(Intrinsics) -> CameraKnowledge) -> (Calibration, f64) {
+    let truth = session(&Setup { noise: NOISE, ..Setup::new(mode, 20, seed) });
+    let observations = Observations { camera: camera(truth.intrinsics), ..truth.observations(false) };
+    let calibration = calibrate(&observations, Method::Joint, &CancelToken::default()).expect("solves");
+    let point = calibration.joint.as_ref().expect("joint").reference_point;
+    let found = calibration.hand_eye.expect("an answer").mount_from_camera();
+    let off_m = (found.isometry() * point - truth.mount_from_camera.isometry() * point).norm();
+    (calibration, off_m)
+}
+
+fn find(calibration: &Calibration, code: FindingCode) -> Option<Finding> {
+    calibration.diagnosis().findings.iter().find(|finding| finding.code == code).cloned()
+}
+
+fn half_a_pixel_off(lens: Intrinsics, azimuth: f64) -> Intrinsics {
+    Intrinsics { cx: lens.cx + 0.5 * azimuth.cos(), cy: lens.cy + 0.5 * azimuth.sin(), ..lens }
+}
+
+#[test]
+fn the_error_of_a_lens_that_is_known_to_half_a_pixel_is_counted_and_the_views_make_it_smaller() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (sessions, mut within, mut squares) = (20, 0, [0.0; 2]);
+        for seed in 0..sessions {
+            let given = |lens| half_a_pixel_off(lens, seed as f64);
+            let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: given(lens), accuracy_px: 0.5 });
+            let (calibration, off_m) = solved(mode, 40 + seed, near);
+            within += usize::from(off_m <= calibration.tip_error_95_m().expect("stated"));
+            let (_, exact_m) = solved(mode, 40 + seed, |lens| CameraKnowledge::Fixed(given(lens)));
+            squares = [squares[0] + off_m.powi(2), squares[1] + exact_m.powi(2)];
+            assert!(find(&calibration, FindingCode::WrongIntrinsics).is_none(), "{mode:?} {seed}");
+        }
+        println!("{mode:?}: {within} of {sessions} within, {:?} mm", squares.map(|s: f64| (s / 20.0).sqrt() * 1e3));
+        // 17 or fewer of 20 come about by chance once in 40.
+        assert!(within > 17, "{mode:?}: {within}");
+        assert!(squares[0] < squares[1], "{mode:?}: {squares:?}");
+    }
+}
+
+#[test]
+fn what_a_lens_taken_as_exact_leaves_out_is_said() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let (calibration, _) = solved(mode, 60, CameraKnowledge::Fixed);
+        let said_m =
+            calibration.joint.as_ref().and_then(|joint| joint.error_at_half_a_pixel_95_m).expect("it was given");
+        let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: lens, accuracy_px: 0.5 });
+        let (estimated, _) = solved(mode, 60, near);
+        let stated_m = estimated.tip_error_95_m().expect("stated");
+        println!("{mode:?}: {said_m} m said, {stated_m} m stated");
+        // Noise levels and reference point are those of another fit.
+        assert!((said_m / stated_m - 1.0).abs() < 0.25, "{mode:?}: {said_m} {stated_m}");
+        assert!(said_m > 2.0 * calibration.tip_error_95_m().expect("stated"), "{mode:?}");
+        let finding = find(&calibration, FindingCode::LensTakenAsExact).expect("more than what is stated");
+        assert!((finding.value("expected_error_at_half_a_pixel").expect("a number") - said_m * 1e3).abs() < 1e-9);
+        assert!(find(&estimated, FindingCode::LensTakenAsExact).is_none(), "{mode:?}");
+    }
+}
+
+#[test]
+fn a_lens_that_is_farther_off_than_is_said_of_it_is_named() {
+    let longer = |lens: Intrinsics| Intrinsics { fx: 1.03 * lens.fx, fy: 1.03 * lens.fy, ..lens };
+    let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: longer(lens), accuracy_px: 0.5 });
+    let (calibration, _) = solved(Mode::EyeInHand, 70, near);
+    let finding = find(&calibration, FindingCode::WrongIntrinsics).expect("it does not fit");
+    assert!(finding.value("lens_off").expect("pixels") > 3.0, "{finding}");
+}
+
+#[test]
+fn an_accuracy_that_is_none_is_refused() {
+    let truth = session(&Setup::new(Mode::EyeInHand, 6, 80));
+    for accuracy_px in [0.0, -1.0, f64::NAN] {
+        let camera = CameraKnowledge::Near(KnownLens { intrinsics: truth.intrinsics, accuracy_px });
+        let observations = Observations { camera, ..truth.observations(false) };
+        let refused = calibrate(&observations, Method::Joint, &CancelToken::default()).expect_err("no accuracy");
+        assert!(matches!(refused, CalibrateError::LensAccuracy { .. }), "{refused}");
+    }
+}
