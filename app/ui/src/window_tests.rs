@@ -444,6 +444,10 @@ fn the_board_and_the_mode_are_set_in_the_target_pane() {
     silent.until("the accuracy", |model| {
         model.document().meta.camera.is_some_and(|camera| camera.fixed && camera.accuracy_px == Some(0.5))
     });
+    silent.click("Estimate");
+    silent.until("an estimate, which has an accuracy of its own", |model| {
+        model.document().meta.camera.is_some_and(|camera| !camera.fixed && camera.accuracy_px.is_none())
+    });
 }
 
 /// Every text that a shape shows.

@@ -12,6 +12,7 @@ use super::text::line_of;
 use super::value::{AngleUnit, Spanning, bad};
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::observations::LENS_ACCURACY_PX;
 use handeye_geometry::targets::TargetSpec;
 use handeye_wording::one_line;
 
@@ -298,12 +299,8 @@ fn accuracy(value: &Spanned<f64>, is_fixed: bool) -> Result<f64, Spanning> {
     if !is_fixed {
         return Err(bad(value, "accuracy_px", "fixed = true beside it: what is estimated has an accuracy of its own"));
     }
-    let is_usable = px.is_finite() && px > 0.0;
-    if is_usable {
-        Ok(px)
-    } else {
-        Err(bad(value, "accuracy_px", "a positive number of pixels; an exact lens has none"))
-    }
+    let want = "a number of pixels between 0.001 and 1000; an exact lens has none";
+    if LENS_ACCURACY_PX.contains(&px) { Ok(px) } else { Err(bad(value, "accuracy_px", want)) }
 }
 
 enum PinholeProblem {

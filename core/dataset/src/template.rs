@@ -297,11 +297,11 @@ fn camera(text: &mut Text, sizes: &BTreeMap<(u32, u32), usize>) {
     text.comment("Only when something is known of the camera; without it the intrinsics are estimated.");
     text.line(format_args!("{CHOICE}[camera]"));
     text.line(format_args!(
-        "{CHOICE}{:<32}# true: the numbers below are exact; false: the estimate starts there",
+        "{CHOICE}{:<32}# true: the numbers below are known; false: the estimate starts there",
         "fixed ="
     ));
     text.line(format_args!(
-        "{CHOICE}{:<32}# with fixed = true: how good they are, pixels; without it they are exact",
+        "{CHOICE}{:<32}# with fixed = true: how good they are, pixels; exact without it",
         "accuracy_px = 0.5"
     ));
     if let Some(((width, height), _)) = sizes.iter().max_by_key(|(_, count)| **count) {

@@ -143,7 +143,7 @@ pub fn target_table(target: &TargetSpec) -> String {
 
 fn camera_table(camera: &CameraInput) -> String {
     let mut text = format!("\n[camera]\nfixed = {}\nmodel = \"{}\"\n", camera.fixed, camera.model.name());
-    if let Some(px) = camera.accuracy_px {
+    if let Some(px) = camera.accuracy_px.filter(|_| camera.fixed) {
         // Writing to a string cannot fail.
         let _ok = writeln!(text, "accuracy_px = {px:?}").is_ok();
     }

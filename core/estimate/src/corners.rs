@@ -7,7 +7,7 @@ use super::refine::{self, Judged, Refined};
 use super::residuals::{residuals, squared_residuals};
 use super::{
     CalibrateError, CalibratedCamera, Fit, JointDepths, JointFit, LinkCovariances, Method, Observations, Options,
-    ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
+    RefutedLens, ShapeEstimate, ViewResult, ViewStatus, check_motion, chosen, closed_forms, two_poses,
 };
 use crate::given_lens;
 use crate::handeye::closed_form::ClosedFormSolution;
@@ -38,8 +38,15 @@ pub fn calibrate(
         Method::Joint => {
             let known = session.lens.known.map(|known| (known.intrinsics, known.information()));
             let prior = known.as_ref().map(|(expected, information)| LensPrior { expected: *expected, information });
+            let refuted = session.refuted_lens(options, work)?;
+            // What is not so does not pull at the answer.
+            let prior = prior.filter(|_| refuted.is_none());
             let refined = session.alone(prior, options, work)?;
-            session.finish(refined, prior, work)
+            let mut fit = session.finish(refined, prior, work)?;
+            if let Some(joint) = &mut fit.joint {
+                joint.refuted_lens = refuted;
+            }
+            Ok(fit)
         }
     }
 }
@@ -138,6 +145,17 @@ impl Session<'_> {
         refine::refine(&problem, &own, &self.lens, begin, options, work)
     }
 
+    /// Whether the views contradict what is known of the lens: as a prior it would pull noise levels along, and hide itself.
+    fn refuted_lens(&self, options: Options, work: &Work<'_>) -> Result<Option<RefutedLens>, CalibrateError> {
+        let Some(known) = &self.lens.known else { return Ok(None) };
+        match self.refine(None, options, work) {
+            Ok(by_views) => Ok(given_lens::refuted(known, &by_views.screened.solution)),
+            Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => Err(HandEyeError::Cancelled.into()),
+            // The views do not determine a lens.
+            Err(_) => Ok(None),
+        }
+    }
+
     /// The joint estimate of the session by itself, with what is known of its lens beforehand, and the error that may be stated.
     pub fn alone(
         &self,
@@ -188,9 +206,10 @@ impl Session<'_> {
         take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
         if let Some(joint) = &mut calibration.joint {
             joint.arm = arm_fit(&problem, &refined.screened.solution, work)?;
-            joint.known_lens = self.lens.known;
+            joint.known_lens = self.lens.known.filter(|_| lens.is_some());
             let solution = &refined.screened.solution;
-            let at_half = given_lens::error_at_half_a_pixel_95_m(&problem, solution, work.cancel);
+            let widened = joint.widening.factor;
+            let at_half = given_lens::error_at_half_a_pixel_95_m(&problem, solution, widened, work.cancel);
             joint.error_at_half_a_pixel_95_m = determined(at_half)?.flatten();
         }
         Ok(calibration)
@@ -283,7 +302,11 @@ fn without_hand_eye(observations: &Observations, seen: &[DetectedView<'_>], lens
     }
     let sigma_px = lens.fit.as_ref().and_then(|fit| fit.sigma_px);
     Fit {
-        camera: Some(CalibratedCamera { intrinsics: lens.intrinsics, fixed: !lens.free, sigma_px }),
+        camera: Some(CalibratedCamera {
+            intrinsics: lens.intrinsics,
+            fixed: !lens.free || lens.known.is_some(),
+            sigma_px,
+        }),
         camera_fit: lens.fit,
         lens_by_corners: (lens.free && lens.known.is_none() && !lens.is_bent()).then_some(lens.intrinsics),
         rms_px: Some(total_rms(lens.rms_px.iter().copied().zip(corners_used))),
@@ -334,13 +357,14 @@ fn take_joint(
     calibration.camera = calibration.camera.map(|camera| CalibratedCamera {
         intrinsics: solution.intrinsics,
         sigma_px: sigma_px.or(camera.sigma_px),
-        ..camera
+        fixed: !solution.free.intrinsics,
     });
     calibration.camera_fit = None;
     calibration.rms_px = Some(solution.rms_px);
     let estimated = solution.free.warp || solution.free.scale;
     calibration.joint = Some(JointFit {
         known_lens: None,
+        refuted_lens: None,
         error_at_half_a_pixel_95_m: None,
         free: solution.free,
         covariance: solution.covariance.clone(),

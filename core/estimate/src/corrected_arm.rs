@@ -97,12 +97,12 @@ impl CorrectedArm {
         Ok(TipAt { base_from_tip, by_errors: tip.by_errors })
     }
 
-    /// The chain with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what the joints give way
+    /// The chain of its links alone, with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what the joints give way
     /// by under gravity and for the field, which no fixed chain has.
     ///
     /// # Errors
     /// [`ArmError`] where the errors are no errors of an arm.
-    pub fn without_gravity(&self) -> Result<Arm, ArmError> {
+    pub fn of_links(&self) -> Result<Arm, ArmError> {
         self.arm.displaced(&self.errors.at_rest())
     }
 
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn the_chain_without_gravity_is_the_real_arm_where_nothing_gives_way() {
+    fn the_chain_of_links_is_the_real_arm_where_nothing_gives_way() {
         for arm in [ArmKind::Ur5e.arm(), handeye_arm::testing::UR5.arm().expect("an arm")] {
             let rigid = |(parameter, value): (&ArmParameter, &f64)| {
                 if parameter.error == LinkError::Compliance { 0.0 } else { *value }
@@ -218,7 +218,7 @@ mod tests {
             let errors = ArmErrors::new(6, values).expect("so many");
             let mount = nalgebra::Isometry3::new([0.1, -0.2, 0.3].into(), [0.4, 1.2, -0.7].into());
             let corrected = CorrectedArm { arm: arm.mounted(mount, mount.inverse()), errors, ..corrected(0.5) };
-            let chain = corrected.without_gravity().expect("an arm");
+            let chain = corrected.of_links().expect("an arm");
             for q in [[0.0; 6], [0.3, -1.3, 1.7, -1.9, -1.6, 0.4], [-2.0, 0.4, 2.2, 1.1, 0.8, -3.0]] {
                 let (m, rad) = chain.forward(&q).expect("six").distance_to(&corrected.actual(&q).expect("six"));
                 assert!(m < 1e-12 && rad < 1e-7, "{m} m, {rad} rad");

@@ -1,9 +1,11 @@
 //! What an answer owes to a lens that is taken as exact.
 
-use nalgebra::Matrix6;
+use nalgebra::{DVector, Matrix6};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
+use crate::RefutedLens;
 use crate::handeye::HandEyeError;
-use crate::handeye::joint::normal::System;
+use crate::handeye::joint::normal::{System, covariance_of};
 use crate::handeye::joint::state::State;
 use crate::handeye::joint::{Free, JointProblem, JointSolution, LensPrior};
 use handeye_geometry::observations::KnownLens;
@@ -15,29 +17,54 @@ use handeye_geometry::progress::CancelToken;
 const USUAL_PX: f64 = 0.5;
 
 /// What the expected error (95 %) of a point would be where [`JointSolution::reference_point`] is, if the lens were only known to half a
-/// pixel, see [`KnownLens`], metres: to first order, at the noise levels of the answer. What the views themselves say of the lens counts.
-/// `None` where the lens is estimated.
+/// pixel, see [`KnownLens`], metres: what that adds to the covariance at the noise levels of the answer, to first order, times what that
+/// is `widened` by. What the views themselves say of the lens counts. `None` where the lens is estimated.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] where the views do not determine the rest.
 pub(crate) fn error_at_half_a_pixel_95_m(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
+    widened: f64,
     cancel: &CancelToken,
 ) -> Result<Option<f64>, HandEyeError> {
     if solution.free.intrinsics {
         return Ok(None);
     }
     let usual = KnownLens { intrinsics: solution.intrinsics, accuracy_px: USUAL_PX }.information();
-    let problem = JointProblem {
+    let usual_lens = JointProblem {
         free: Free { intrinsics: true, ..solution.free },
         lens_prior: Some(LensPrior { expected: solution.intrinsics, information: &usual }),
         ..*problem
     };
-    let covariance = System::new(&problem, &State::of(solution), cancel)?.reduce(&solution.noise)?.inverse();
-    let hand_eye: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into_owned();
+    let of_hand_eye = |problem: &JointProblem<'_>| -> Result<Matrix6<f64>, HandEyeError> {
+        let covariance = System::new(problem, &State::of(solution), cancel)?.reduce(&solution.noise)?.inverse();
+        Ok(covariance.fixed_view::<6, 6>(0, 0).into_owned())
+    };
+    let added = of_hand_eye(&usual_lens)? - of_hand_eye(problem)?;
+    let hand_eye = solution.hand_eye_covariance() + added * widened;
     let of_point = point_error::covariance(&hand_eye, &solution.reference_point);
     Ok(Some(solution.small_sample.radius_95(&of_point)))
+}
+
+/// Lenses that are as good as is said of them and are called another one.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// Whether the views contradict what is said of a lens, by the lens that they show without it: the two are independent, and their
+/// difference has both covariances.
+pub(crate) fn refuted(known: &KnownLens, by_views: &JointSolution) -> Option<RefutedLens> {
+    let lens = by_views.lens_places();
+    let parameters = by_views.intrinsics.parameters().into_iter().zip(known.intrinsics.parameters());
+    let off = DVector::from_vec(parameters.map(|(shown, given)| shown - given).collect());
+    if off.len() != lens.len() {
+        return None;
+    }
+    let information = known.information();
+    let of_views = by_views.covariance.view((lens.start, lens.start), (lens.len(), lens.len()));
+    let both = covariance_of(&(covariance_of(&information)? + of_views))?;
+    let most = ChiSquared::new(off.len() as f64).ok()?.inverse_cdf(1.0 - FALSE_ALARM);
+    let off_px = off.dot(&(&information * &off)).max(0.0).sqrt() * known.accuracy_px;
+    (off.dot(&(both * &off)) > most).then_some(RefutedLens { accuracy_px: known.accuracy_px, off_px })
 }
 
 #[cfg(test)]

@@ -33,12 +33,14 @@ fn half_a_pixel_off(lens: Intrinsics, azimuth: f64) -> Intrinsics {
 #[test]
 fn the_error_of_a_lens_that_is_known_to_half_a_pixel_is_counted_and_the_views_make_it_smaller() {
     for mode in [Mode::EyeInHand, Mode::EyeToHand] {
-        let (sessions, mut within, mut squares) = (20, 0, [0.0; 2]);
+        let (sessions, mut within, mut squares, mut stated) = (20, 0, [0.0; 2], 0.0);
         for seed in 0..sessions {
             let given = |lens| half_a_pixel_off(lens, seed as f64);
             let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: given(lens), accuracy_px: 0.5 });
             let (calibration, off_m) = solved(mode, 40 + seed, near);
-            within += usize::from(off_m <= calibration.tip_error_95_m().expect("stated"));
+            let stated_m = calibration.tip_error_95_m().expect("stated");
+            within += usize::from(off_m <= stated_m);
+            stated += stated_m.powi(2);
             let (_, exact_m) = solved(mode, 40 + seed, |lens| CameraKnowledge::Fixed(given(lens)));
             squares = [squares[0] + off_m.powi(2), squares[1] + exact_m.powi(2)];
             assert!(find(&calibration, FindingCode::WrongIntrinsics).is_none(), "{mode:?} {seed}");
@@ -47,6 +49,8 @@ fn the_error_of_a_lens_that_is_known_to_half_a_pixel_is_counted_and_the_views_ma
         // 17 or fewer of 20 come about by chance once in 40.
         assert!(within > 17, "{mode:?}: {within}");
         assert!(squares[0] < squares[1], "{mode:?}: {squares:?}");
+        // Of a Gaussian in space 95 % are within 1.6 (a ball) to 2 times (a line) of the RMS.
+        assert!(squares[0] > stated / 9.0, "{mode:?}: {squares:?} {stated}");
     }
 }
 
@@ -73,9 +77,18 @@ fn what_a_lens_taken_as_exact_leaves_out_is_said() {
 fn a_lens_that_is_farther_off_than_is_said_of_it_is_named() {
     let longer = |lens: Intrinsics| Intrinsics { fx: 1.03 * lens.fx, fy: 1.03 * lens.fy, ..lens };
     let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: longer(lens), accuracy_px: 0.5 });
-    let (calibration, _) = solved(Mode::EyeInHand, 70, near);
+    let (calibration, off_m) = solved(Mode::EyeInHand, 70, near);
     let finding = find(&calibration, FindingCode::WrongIntrinsics).expect("it does not fit");
     assert!(finding.value("lens_off").expect("pixels") > 3.0, "{finding}");
+    let joint = calibration.joint.as_ref().expect("joint");
+    assert!(joint.known_lens.is_none() && !calibration.camera.expect("a lens").fixed, "the views alone say what it is");
+    assert!(off_m <= calibration.tip_error_95_m().expect("stated"), "{off_m}");
+    // As firmly as it is said, and as gently.
+    for accuracy_px in [0.01, 0.1, 1.0] {
+        let near = |lens| CameraKnowledge::Near(KnownLens { intrinsics: longer(lens), accuracy_px });
+        let (calibration, _) = solved(Mode::EyeInHand, 71, near);
+        assert!(find(&calibration, FindingCode::WrongIntrinsics).is_some(), "{accuracy_px}");
+    }
 }
 
 #[test]

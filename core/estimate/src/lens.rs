@@ -9,6 +9,7 @@ use crate::intrinsics::{self, Bend, Found, IntrinsicsError, Options, Screened};
 use crate::wrong_corners::without;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_geometry::observations::LENS_ACCURACY_PX;
 use handeye_geometry::planar_pose::{self, PlanarPose, Solution};
 use handeye_geometry::progress::{Stage, Work};
 use handeye_geometry::statistics::median;
@@ -47,7 +48,7 @@ impl Lens {
             CameraKnowledge::Fixed(intrinsics) => Self::given(intrinsics, observations, seen, work),
             CameraKnowledge::Near(known) => {
                 let given = Self::given(known.intrinsics, observations, seen, work)?;
-                if !(known.accuracy_px > 0.0 && known.accuracy_px.is_finite()) {
+                if !LENS_ACCURACY_PX.contains(&known.accuracy_px) {
                     return Err(CalibrateError::LensAccuracy { accuracy_px: known.accuracy_px });
                 }
                 // The robot's motion is what tells more of it.

@@ -274,8 +274,8 @@ pub enum CalibrateError {
     /// The camera could not be calibrated.
     #[error(transparent)]
     Intrinsics(#[from] IntrinsicsError),
-    /// The accuracy of a lens that is given is no length.
-    #[error("the lens given is said to be good to {accuracy_px} px: say a positive number of pixels")]
+    /// The accuracy of a lens that is given is not in [`LENS_ACCURACY_PX`](handeye_geometry::observations::LENS_ACCURACY_PX).
+    #[error("the lens given is said to be good to {accuracy_px} px: say a number of pixels between 0.001 and 1000")]
     LensAccuracy {
         /// What is said.
         accuracy_px: f64,
@@ -305,6 +305,15 @@ pub enum CalibrateError {
 
 /// Where the lens begins among the unknowns that [`JointFit::covariance`] is of: both links come first.
 const LENS_AT: usize = 12;
+
+/// A lens that is farther off than is said of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RefutedLens {
+    /// What is said of it, pixels.
+    pub accuracy_px: f64,
+    /// What the lens that fits displaces points of the image by, RMS, pixels.
+    pub off_px: f64,
+}
 
 /// What a fit gives. It states no error: [`Calibration`](crate::diagnose::Calibration) does, once the fit is examined.
 #[derive(Debug, Clone, Default)]
@@ -484,8 +493,10 @@ pub struct JointFit {
     /// By how much the robot's noise moves a corner, RMS of the 2-D distance in pixels; what of it a fit cannot follow
     /// stays in the answer.
     pub robot_effect_px: f64,
-    /// What was known of the lens beforehand, where that is not all or nothing.
+    /// What was known of the lens beforehand and counts, where that is not all or nothing.
     pub known_lens: Option<KnownLens>,
+    /// What was said of the lens, where the views contradict it: the lens is estimated from them alone.
+    pub refuted_lens: Option<RefutedLens>,
     /// What the expected error (95 %) would be where it is stated if a lens that was taken as exact were only known to half a pixel,
     /// metres; `None` where the lens is estimated.
     pub error_at_half_a_pixel_95_m: Option<f64>,

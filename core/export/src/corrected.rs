@@ -7,7 +7,7 @@ use super::{ExportError, ExportInput};
 use handeye_arm::{Arm, Joint, JointKind};
 use handeye_result::ResultProblem;
 
-/// The arm of a result as its controller counts, and as it is but for gravity.
+/// The arm of a result as its controller counts, and as it is but for gravity and for what changes with the place of the tip.
 #[derive(Debug, Clone)]
 pub(super) struct CorrectedChain {
     /// As the controller counts.
@@ -28,7 +28,7 @@ impl CorrectedChain {
             let problem = "it has a joint that is prismatic, and errors are those of revolute joints";
             return Err(ExportError::OtherArm { format, problem });
         }
-        let chain = corrected.without_gravity();
+        let chain = corrected.of_links();
         let problem = "a number of it is of no arm: calibrate again";
         let chain = chain.map_err(|_error| ExportError::OtherArm { format, problem })?;
         Ok(Self { nominal: corrected.arm, corrected: chain })
@@ -37,8 +37,12 @@ impl CorrectedChain {
 
 /// What the first comment says of an arm: which transform, units, what is not in it, what it goes with, and what made it.
 pub(super) fn about_arm(input: &ExportInput<'_>, [base, tip]: [&str; 2], rotation: &str) -> String {
+    let field = input.result.arm.as_ref().and_then(|arm| arm.field.as_ref()).map_or_else(String::new, |field| {
+        let (mm, deg) = (field.typical_mm, field.typical_deg);
+        format!(" Nor is what changes with the place of the tip, typically {mm:.3} mm and {deg:.4}°: use `handeye correct` for it.")
+    });
     format!(
-        "T_{base}_{tip} of the corrected arm, from what its joints report. Metres; {rotation}. Compliance under gravity is not in it. \
+        "T_{base}_{tip} of the corrected arm, from what its joints report. Metres; {rotation}. Compliance under gravity is not in it.{field} \
          It belongs to hand-eye and intrinsics of arm in the result JSON, not to the plain ones. {}",
         made_by(input.result)
     )

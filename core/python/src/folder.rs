@@ -74,6 +74,7 @@ pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, Str
         "target": dataset.target,
         "image_size": dataset.image_size,
         "intrinsics": lens,
+        "intrinsics_accuracy_px": dataset.camera.and_then(|camera| camera.accuracy_px),
         "intrinsics_are_known": dataset.camera.is_some_and(|camera| camera.fixed),
         "lens_model": dataset.camera.map(|camera| camera.model.name()),
         "names": entries.iter().map(|entry| &entry.name).collect::<Vec<_>>(),

@@ -36,8 +36,8 @@ pub struct ArmEstimate {
     /// The target's shape that goes with them, where it was estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardEstimate>,
-    /// Errors that depend on where the tip stands and that joints and links do not explain, where the data show them: of the pose by the
-    /// chain with its errors.
+    /// Errors that depend on where the tip stands and that joints and links do not explain, where the data show them: `E` of the reported
+    /// pose, behind the pose of the tip by the chain with its errors. Corrected poses are with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<PoseDependentErrorEstimate>,
     /// Covariance of the errors, radians and metres: for the joints in their order all `tilt` (x, y) and `zero`, then all `shift`
@@ -173,7 +173,6 @@ impl ArmEstimate {
         let block = |at: usize| -> Matrix6<f64> { fit.covariance.fixed_view::<6, 6>(at, at).into_owned() };
         let (hand_eye, target) = TransformEstimate::of_links(&fit.hand_eye, Some(&block(0)), Some(&block(6)));
         let of_errors = of_document(&fit.errors, &fit.errors_covariance());
-        let corrected_px = fit.heldout_px.map(|[_, corrected]| corrected);
         let lens_sigma = fit.intrinsics_sigma();
         let sigma = lens_sigma.first_chunk().copied();
         let intrinsics = IntrinsicsEstimate::new(&fit.beside.intrinsics, sigma, lens_sigma.is_empty());
@@ -194,7 +193,7 @@ impl ArmEstimate {
             target,
             intrinsics: Some(intrinsics),
             board: fit.shape().map(BoardEstimate::from),
-            field: fit.errors.field().map(|it| PoseDependentErrorEstimate::new(it, &fit.noise, corrected_px)),
+            field: fit.errors.field().map(|it| PoseDependentErrorEstimate::new(it, &fit.noise, None)),
             covariance: of_errors.row_iter().map(|row| row.iter().copied().collect()).collect(),
             degrees_of_freedom: Some(fit.small_sample.degrees_of_freedom).filter(|value| value.is_finite()),
             region_scale: fit.small_sample.scale,

@@ -15,6 +15,7 @@ use handeye_estimate::handeye::{HandEye, Mode};
 use handeye_export::ExportView;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Pose, Tip};
+use handeye_geometry::observations::LENS_ACCURACY_PX;
 use handeye_geometry::targets::TargetSpec;
 use handeye_result::{CalibrationResult, TransformEstimate};
 use handeye_wording::Text;
@@ -236,8 +237,11 @@ impl SessionMeta {
         if camera.fixed && camera.intrinsics.is_none() {
             return Err(bad("camera", text!("is fixed and has no intrinsics")));
         }
-        if camera.accuracy_px.is_some_and(|px| !(px.is_finite() && px > 0.0)) {
-            return Err(bad("camera.accuracy_px", text!("is no positive number of pixels")));
+        if camera.accuracy_px.is_some_and(|px| !camera.fixed || !LENS_ACCURACY_PX.contains(&px)) {
+            return Err(bad(
+                "camera.accuracy_px",
+                text!("is of intrinsics that are estimated, or not between 0.001 and 1000 px"),
+            ));
         }
         match camera.intrinsics.map(|k| k.validate()) {
             Some(Err(why)) => Err(bad("camera.intrinsics", why.into())),

@@ -162,6 +162,11 @@ fn an_edit_that_does_not_fit_is_refused_with_the_reason() {
     no_focus.fx = f64::NAN;
     let unusable = CameraInput { fixed: true, accuracy_px: None, intrinsics: Some(no_focus), model: Distortion::None };
     assert!(matches!(before.apply(&Edit::SetCamera(Some(unusable))), Err(EditError::Bad { .. })));
+    let lens = before.meta.camera.and_then(|camera| camera.intrinsics).expect("a lens");
+    for (fixed, px) in [(false, 0.5), (true, 0.0), (true, f64::NAN), (true, 1e4)] {
+        let of = CameraInput { fixed, accuracy_px: Some(px), intrinsics: Some(lens), model: lens.distortion };
+        assert!(matches!(before.apply(&Edit::SetCamera(Some(of))), Err(EditError::Bad { .. })), "{fixed} {px}");
+    }
 }
 
 #[test]

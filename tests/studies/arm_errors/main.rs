@@ -58,12 +58,17 @@ fn run() -> Result<(), Failure> {
     let accuracy_px = arguments.iter().find_map(|argument| argument.strip_prefix("accuracy=")).map(str::parse);
     let accuracy_px = accuracy_px.transpose()?;
     let asked = Asked { views, free_lens: given("lens"), accuracy_px, guided: given("guided"), of_links: true };
-    if Path::new(what).extension().is_some_and(|ending| ending == "csv") {
+    let wrong = Wrong::ALL.into_iter().find(|(name, _)| given(name)).map(|(_, wrong)| wrong).unwrap_or_default();
+    let said = wrong != Wrong::Nothing || asked.accuracy_px.is_some();
+    let is_file = Path::new(what).extension().is_some_and(|ending| ending == "csv");
+    if said && (is_file || asked.guided || given("unknown")) {
+        return Err("what else is wrong is for drawn arms with random views and a known chain".into());
+    }
+    if is_file {
         return of_file(what, asked, given("exact"), given("joints"));
     }
     let sessions = arguments.iter().find_map(|argument| argument.strip_prefix("sessions="));
     let sessions: u64 = sessions.map_or(Ok(40), str::parse)?;
-    let wrong = Wrong::ALL.into_iter().find(|(name, _)| given(name)).map(|(_, wrong)| wrong).unwrap_or_default();
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| given(kind.name())).collect();
     let kinds = if kinds.is_empty() { Kind::ALL.to_vec() } else { kinds };
     if given("unknown") {
@@ -157,7 +162,10 @@ fn of_drawn(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kinds
         println!(
             "\n{name}, {wrong:?}, {set_up}, {} views, lens {}\n\n{HEADER}",
             asked.views,
-            if asked.free_lens { "estimated" } else { "known" }
+            match asked.accuracy_px {
+                Some(px) => format!("known to {px} px"),
+                None => if asked.free_lens { "estimated" } else { "known" }.to_owned(),
+            }
         );
         for kind in kinds {
             let one = |seed: u64| {

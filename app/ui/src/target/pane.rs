@@ -72,7 +72,12 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     if let Some(fixed) = form::choice_ui(ui, fixed, &choices) {
         let intrinsics = start(model);
         outbox.send(session::Command::SetCamera(Some(match camera {
-            Some(camera) => CameraInput { fixed, intrinsics: camera.intrinsics.or(Some(intrinsics)), ..camera },
+            Some(camera) => CameraInput {
+                fixed,
+                accuracy_px: camera.accuracy_px.filter(|_| fixed),
+                intrinsics: camera.intrinsics.or(Some(intrinsics)),
+                ..camera
+            },
             None => {
                 let model = intrinsics.distortion;
                 CameraInput { fixed, accuracy_px: None, intrinsics: Some(intrinsics), model }
@@ -104,16 +109,17 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let mut accuracy = accuracy_px.unwrap_or(0.0);
     form::row_ui(ui, tr!(language, "Accuracy"), |ui| {
         let exact = tr!(language, "exact");
-        let shown = move |px: f64, _| if px > 0.0 { format!("± {px:.2} px") } else { exact.to_owned() };
+        let shown = move |px: f64, _| if px > 0.0 { format!("± {px} px") } else { exact.to_owned() };
         let value = DragValue::new(&mut accuracy)
             .speed(0.01)
             .range(0.0..=MOST_PX)
+            .clamp_existing_to_range(false)
             .custom_formatter(shown)
             .custom_parser(pixels);
         number_ui(ui, tr!(language, "Accuracy of the intrinsics"), value).on_hover_text(tr!(
             language,
-            "By how much they may displace points of the image, one standard deviation; half a pixel is usual of a data sheet or \
-             another program. The expected error counts it. At 0 they are taken as exact."
+            "By how much each of them may displace points of the image, one standard deviation, RMS; half a pixel is usual of a data \
+             sheet or another program. The expected error counts it. At 0 they are taken as exact."
         ));
     });
     let accuracy = Some(accuracy).filter(|px| *px > 0.0);

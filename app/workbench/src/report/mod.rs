@@ -205,6 +205,11 @@ fn arm(result: &CalibrationResult) -> Option<Section> {
     let arm = result.arm.as_ref()?;
     let ArmLevels { angle_deg, length_mm, compliance_deg } = arm.levels;
     let mut summary = vec![format!("typically {angle_deg:.4}° and {length_mm:.4} mm, compliance {compliance_deg:.4}°")];
+    if let Some(field) = &arm.field {
+        let (mm, deg) = (field.typical_mm, field.typical_deg);
+        summary
+            .push(format!("beside them errors that depend on the place: {mm:.3} mm and {deg:.4}° per axis, typically"));
+    }
     if let Some(HeldOutByArm { reported, corrected }) = arm.heldout_px {
         let verdict = if arm.contradicted { ": do not correct by them" } else { "" };
         summary.push(format!("held-out error {reported:.4} → {corrected:.4} px by corrected poses{verdict}"));

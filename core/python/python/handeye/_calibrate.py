@@ -68,8 +68,8 @@ def calibrate(
     intrinsics
         The camera, where it is known: taken as exact, or as well as `intrinsics_accuracy_px` says. Otherwise it is estimated.
     intrinsics_accuracy_px
-        What `intrinsics` may displace points of the image by, one standard deviation, pixels; half a pixel is usual of a data
-        sheet or another program. They then follow the views as far as these know more, and the expected error counts it.
+        What each parameter of `intrinsics` may displace points of the image by, one standard deviation, RMS, pixels; half a pixel
+        is usual of a data sheet or another program. They then follow the views as far as these know more, and the expected error counts it.
     intrinsics_start
         Where that estimate starts; found from the views when left out.
     lens_model
@@ -234,8 +234,12 @@ def _observations(
         raise InputError("image_size is missing: (width, height) in pixels")
     if intrinsics is not None and (intrinsics_start is not None or lens_model is not None):
         raise InputError("intrinsics are known and not estimated: leave intrinsics_start and lens_model out")
-    if intrinsics_accuracy_px is not None and (intrinsics is None or not intrinsics_accuracy_px > 0):
-        raise InputError("intrinsics_accuracy_px is a positive number of pixels, and goes with intrinsics")
+    if intrinsics_accuracy_px is not None:
+        intrinsics_accuracy_px = float(intrinsics_accuracy_px)
+        if intrinsics is None or camera_from_target is not None or not 1e-3 <= intrinsics_accuracy_px <= 1e3:
+            raise InputError(
+                "intrinsics_accuracy_px is a number of pixels between 0.001 and 1000, and goes with corners and intrinsics"
+            )
     if (joints is None) != (arm is None):
         given, missing = ("joints", "arm") if arm is None else ("arm", "joints")
         raise InputError(

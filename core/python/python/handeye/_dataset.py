@@ -29,7 +29,9 @@ class Dataset:
     intrinsics: Optional[Intrinsics]
     """What `[camera]` says of fx … and distortion."""
     intrinsics_are_known: bool
-    """Whether they stay as they are; otherwise an estimate starts there."""
+    """Whether they are known; otherwise an estimate starts there."""
+    intrinsics_accuracy_px: Optional[float]
+    """How well, pixels; None where they are taken as exact."""
     names: List[str]
     """Of the views, as the pose table has them."""
     image_paths: List[Optional[str]]
@@ -93,6 +95,7 @@ def load_dataset(path: Union[str, "os.PathLike[str]"]) -> Dataset:
         image_size=None if said["image_size"] is None else (said["image_size"][0], said["image_size"][1]),
         intrinsics=Intrinsics._of(said["intrinsics"]),
         intrinsics_are_known=said["intrinsics_are_known"],
+        intrinsics_accuracy_px=said["intrinsics_accuracy_px"],
         names=said["names"],
         image_paths=said["image_paths"],
         base_from_tip=stack("base_from_tip"),

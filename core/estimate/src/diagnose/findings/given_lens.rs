@@ -1,15 +1,10 @@
 //! Findings on a lens that was given.
 
-use nalgebra::DVector;
-use statrs::distribution::{ChiSquared, ContinuousCDF as _};
-
 use super::{Finding, FindingCode, Severity};
+use crate::RefutedLens;
 use crate::diagnose::Calibration;
 use crate::resolution;
 use handeye_wording::{shown, text};
-
-/// Lenses that are as good as is said of them and are called another one.
-const FALSE_ALARM: f64 = 1e-3;
 
 pub fn findings(calibration: &Calibration) -> impl Iterator<Item = Finding> {
     taken_as_exact(calibration).into_iter().chain(beyond_accuracy(calibration))
@@ -27,8 +22,8 @@ fn taken_as_exact(calibration: &Calibration) -> Option<Finding> {
         return None;
     }
     let text = text!(
-        "The lens given is taken as exact. If it is good to half a pixel, as those of data sheets and other programs are, the expected \
-         error is {error} mm. Say how good it is (`accuracy_px` in `[camera]`, *Accuracy* of the intrinsics), or let it be estimated.",
+        "The lens given is taken as exact. If each of its parameters is good to half a pixel, as those of data sheets and other \
+         programs are, the expected error is {error} mm. Say how good it is (`accuracy_px` in `[camera]`, *Accuracy* of the intrinsics), or let it be estimated.",
         error = shown(at_half_m * 1e3, 2)
     );
     let finding = Finding::new(FindingCode::LensTakenAsExact, Severity::Info, text);
@@ -37,21 +32,13 @@ fn taken_as_exact(calibration: &Calibration) -> Option<Finding> {
 
 /// The lens that fits is farther from the one given than is said of it.
 fn beyond_accuracy(calibration: &Calibration) -> Option<Finding> {
-    let (known, now) = (calibration.joint.as_ref()?.known_lens?, calibration.intrinsics()?);
-    let parameters = now.parameters().into_iter().zip(known.intrinsics.parameters());
-    let off = DVector::from_vec(parameters.map(|(now, given)| now - given).collect());
-    let squared = off.dot(&(known.information() * &off));
-    let most = ChiSquared::new(off.len() as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - FALSE_ALARM));
-    if squared <= most {
-        return None;
-    }
-    let off_px = squared.sqrt() * known.accuracy_px;
+    let RefutedLens { accuracy_px, off_px } = calibration.joint.as_ref()?.refuted_lens?;
     let text = text!(
-        "The lens given is said to be good to {accuracy} px, and the one that fits displaces points of the image by {off} px, RMS. Give \
-         that of this camera at this image size, or let it be estimated.",
-        accuracy = shown(known.accuracy_px, 2),
+        "The lens given is said to be good to {accuracy} px, and the one that fits displaces points of the image by {off} px, RMS: the answer \
+         is by the lens that the views alone show. Give that of this camera at this image size, or let it be estimated.",
+        accuracy = shown(accuracy_px, 2),
         off = shown(off_px, 2)
     );
     let finding = Finding::new(FindingCode::WrongIntrinsics, Severity::Warning, text);
-    Some(finding.with("lens_accuracy", known.accuracy_px, "px").with("lens_off", off_px, "px"))
+    Some(finding.with("lens_accuracy", accuracy_px, "px").with("lens_off", off_px, "px"))
 }

@@ -24,8 +24,9 @@ use handeye_geometry::targets::observation::View;
 
 /// Slopes of errors of one kind in the axes of one frame: along three axes of the base, which are neighbours.
 pub(crate) const PER_FRAME: usize = 9;
-/// Views from which on a field is looked for. With fewer there are not twice as many numbers as unknowns and slopes, and the
-/// slopes are the noise.
+/// Views from which on a field is looked for. With fewer there are not twice as many numbers as unknowns and slopes in the axes of the
+/// tip, and the slopes are the noise. Beside an arm, where slopes and errors of links are more than the numbers of ten views, what is known
+/// of arms stands for what is missing.
 pub const FIELD_VIEWS: usize = 10;
 /// Least spread of the places, RMS, metres: an arm that turns on the spot has no field.
 const LEAST_SPREAD_M: f64 = 1e-3;

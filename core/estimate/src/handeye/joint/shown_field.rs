@@ -78,7 +78,9 @@ fn gains(with: &JointProblem<'_>, without: &JointSolution, cancel: &CancelToken)
 /// Minus twice the log-likelihood of an estimate whose target may be of another size, to compare with one whose may not:
 /// the size is integrated over what is known of it beforehand, as the slopes of the field are.
 fn by_size(sized: &JointSolution) -> Option<f64> {
-    Some(sized.deviance? + 2.0 * SIZE_SIGMA.ln() + ((sized.shape.scale - 1.0) / SIZE_SIGMA).powi(2))
+    // Beside an arm its quadratic part is among the equations already.
+    let prior = if sized.free.arm { 0.0 } else { ((sized.shape.scale - 1.0) / SIZE_SIGMA).powi(2) };
+    Some(sized.deviance? + 2.0 * SIZE_SIGMA.ln() + prior)
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ pub(crate) fn warp_ratio(
 fn ratio(with: &JointProblem<'_>, near: &JointSolution, cancel: &CancelToken) -> Result<Option<f64>, HandEyeError> {
     let state = State::of(near);
     let system = System::new(with, &state, cancel)?;
-    let levels = Levels { view: near.noise.view_px > 0.0, field: state.field.is_some(), arm: state.arm.is_some() };
+    let levels = Levels { view: near.noise.view_px > 0.0, field: state.has_field(), arm: state.arm.is_some() };
     let (noise, _) = variance::restricted_likelihood(&system, &to_logs(&near.noise), levels, variance::ROUGHLY)?;
     let reduced = system.reduce(&noise)?;
     let (step, covariance) = (reduced.shared_step(), reduced.inverse());
