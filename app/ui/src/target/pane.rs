@@ -71,17 +71,14 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     ];
     if let Some(fixed) = form::choice_ui(ui, fixed, &choices) {
         let intrinsics = start(model);
-        outbox.send(session::Command::SetCamera(Some(match camera {
-            Some(camera) => CameraInput {
-                fixed,
-                accuracy_px: camera.accuracy_px.filter(|_| fixed),
-                intrinsics: camera.intrinsics.or(Some(intrinsics)),
-                ..camera
-            },
-            None => {
-                let model = intrinsics.distortion;
-                CameraInput { fixed, accuracy_px: None, intrinsics: Some(intrinsics), model }
-            }
+        let unknown =
+            CameraInput { fixed, accuracy_px: None, intrinsics: Some(intrinsics), model: intrinsics.distortion };
+        let camera = camera.unwrap_or(unknown);
+        outbox.send(session::Command::SetCamera(Some(CameraInput {
+            fixed,
+            accuracy_px: camera.accuracy_px.filter(|_| fixed),
+            intrinsics: camera.intrinsics.or(Some(intrinsics)),
+            ..camera
         })));
     }
     let Some(CameraInput { intrinsics: Some(before), accuracy_px, .. }) = camera.filter(|camera| camera.fixed) else {

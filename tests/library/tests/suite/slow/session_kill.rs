@@ -65,7 +65,7 @@ fn record(id: CaptureId) -> CaptureRecord {
 #[derive(Debug, Clone)]
 enum Action {
     Capture,
-    Edit(Edit),
+    Edit(Box<Edit>),
     Undo,
     Redo,
     SaveAs,
@@ -80,9 +80,9 @@ fn choose(rng: &mut ChaCha8Rng, history: &History) -> Action {
         (0..2, Some(one)) => {
             let mut ids = vec![one.id];
             ids.extend(two.filter(|two| *two != one.id));
-            Action::Edit(Edit::DeleteCaptures(ids))
+            Action::Edit(Box::new(Edit::DeleteCaptures(ids)))
         }
-        (2..5, Some(one)) => Action::Edit(Edit::SetExcluded { ids: vec![one.id], excluded: !one.excluded }),
+        (2..5, Some(one)) => Action::Edit(Box::new(Edit::SetExcluded { ids: vec![one.id], excluded: !one.excluded })),
         (5..10, _) if history.undo_edit().is_some() => Action::Undo,
         (10..13, _) if history.redo_edit().is_some() => Action::Redo,
         (13..15, _) => Action::SaveAs,
@@ -97,7 +97,7 @@ fn model(history: &mut History, action: &Action) {
             let id = history.next_capture_id().expect("few captures");
             history.apply(Edit::AddCapture(Box::new(record(id)))).expect("a capture");
         }
-        Action::Edit(edit) => history.apply(edit.clone()).expect("an edit"),
+        Action::Edit(edit) => history.apply((**edit).clone()).expect("an edit"),
         Action::Undo => history.undo().expect("undo"),
         Action::Redo => history.redo().expect("redo"),
         Action::SaveAs => {}
@@ -112,7 +112,7 @@ fn act(store: &mut Store, action: Action, copy: &Path) {
             let capture = Capture { depth_m: Some(&depth), ..Capture::new(&image, base_from_tip(id)) };
             assert_eq!(store.add_capture(&capture).expect("add"), id);
         }
-        Action::Edit(edit) => store.apply(edit).expect("edit"),
+        Action::Edit(edit) => store.apply(*edit).expect("edit"),
         Action::Undo => store.undo().expect("undo"),
         Action::Redo => store.redo().expect("redo"),
         Action::SaveAs => drop(store.save_as(copy).expect("save as")),
