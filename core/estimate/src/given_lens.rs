@@ -37,11 +37,11 @@ pub(crate) fn error_at_half_a_pixel_95_m(
         lens_prior: Some(LensPrior { expected: solution.intrinsics, information: &usual }),
         ..*problem
     };
-    let of_hand_eye = |problem: &JointProblem<'_>| -> Result<Matrix6<f64>, HandEyeError> {
-        let covariance = System::new(problem, &State::of(solution), cancel)?.reduce(&solution.noise)?.inverse();
-        Ok(covariance.fixed_view::<6, 6>(0, 0).into_owned())
+    let of_hand_eye = |system: &System| -> Result<Matrix6<f64>, HandEyeError> {
+        Ok(system.reduce(&solution.noise)?.inverse().fixed_view::<6, 6>(0, 0).into_owned())
     };
-    let added = of_hand_eye(&usual_lens)? - of_hand_eye(problem)?;
+    let with_lens = System::new(&usual_lens, &State::of(solution), cancel)?;
+    let added = of_hand_eye(&with_lens)? - of_hand_eye(solution.linearised(problem)?)?;
     let hand_eye = solution.hand_eye_covariance() + added * widened;
     let of_point = point_error::covariance(&hand_eye, &solution.reference_point);
     Ok(Some(solution.small_sample.radius_95(&of_point)))
