@@ -34,7 +34,8 @@ pub struct ArmFit {
     pub small_sample: SmallSample,
     /// Noise levels, those of the arm's errors among them; what of the robot remains is what its links do not explain.
     pub noise: Noise,
-    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses as they are and by corrected ones; `None` with too few views.
+    /// RMS of 2-D corner residuals on views left out \[px\], by reported poses as they are and by corrected ones; `None` with too few
+    /// views.
     pub heldout_px: Option<[f64; 2]>,
     /// Whether views left out contradict the errors: they are predicted worse by corrected poses than by reported ones, by more than
     /// chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected poses,

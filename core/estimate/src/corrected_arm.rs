@@ -97,8 +97,8 @@ impl CorrectedArm {
         Ok(TipAt { base_from_tip, by_errors: tip.by_errors })
     }
 
-    /// The chain of its links alone, with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what the joints give way
-    /// by under gravity and for the field, which no fixed chain has.
+    /// The chain of its links alone, with its joints where they really are, for descriptions of robots: [`Self::actual`] but for what
+    /// the joints give way by under gravity and for the field, which no fixed chain has.
     ///
     /// # Errors
     /// [`ArmError`] where the errors are no errors of an arm.

@@ -9,8 +9,8 @@ use super::*;
 use handeye_arm::urdf::Urdf;
 use handeye_arm::{Arm, ArmKind, testing};
 use handeye_estimate::ArmFit;
-use handeye_estimate::handeye::joint::{ArmErrors, LinkError, arm_parameters};
-use handeye_result::testing::{golden, golden_arm};
+use handeye_estimate::handeye::joint::{ArmErrors, LinkError, Noise, arm_parameters};
+use handeye_result::testing::{golden, golden_arm, golden_arm_with_a_field};
 use handeye_result::{ArmEstimate, CalibrationResult};
 use proptest::prelude::*;
 
@@ -247,6 +247,25 @@ fn an_arm_that_is_not_known_or_contradicted_or_another_is_refused_with_what_to_d
         assert!(matches!(error, ExportError::OtherArm { .. }), "{error}");
         assert!(why.split('|').any(|why| error.to_string().contains(why)), "{error}");
         assert!(error.to_string().contains("Export arm_urdf or dh_table"), "{error}");
+    }
+}
+
+#[test]
+fn what_no_fixed_chain_has_is_said_with_its_size() {
+    let files = [
+        ("arm_urdf", "my_cell_arm.urdf"),
+        ("ur_kinematics", "my_cell_kinematics.yaml"),
+        ("dh_table", "my_cell_dh.csv"),
+    ];
+    for (with_field, (chain, fit)) in [(false, golden_arm()), (true, golden_arm_with_a_field())] {
+        let fit = ArmFit { noise: Noise { field_m: 4e-4, ..fit.noise }, ..fit };
+        let arm = ArmEstimate::new(&chain, &fit, [0.0, 0.0, 0.1]);
+        let result = CalibrationResult { arm, ..golden() };
+        for (format, name) in files {
+            let text = text_of(format, name, &result);
+            assert!(text.contains("Compliance under gravity is not in it."), "{format}: {text}");
+            assert_eq!(text.contains("changes with the place of the tip, typically 0.400 mm"), with_field, "{format}");
+        }
     }
 }
 

@@ -306,7 +306,7 @@ mod tests {
         for (a, b) in here.errors.values().iter().zip(there.errors.values()) {
             assert!((a - b).abs() < 1e-15, "{a} {b}");
         }
-        assert!((&here.covariance - &there.covariance).amax() < 1e-20);
+        assert_eq!(here.covariance, there.covariance);
         let lens = read.intrinsics.as_ref().and_then(IntrinsicsEstimate::intrinsics);
         assert_eq!(lens, Some(fit.beside.intrinsics), "the lens that goes with its hand-eye");
         let joints = [0.1, -1.2, 1.4, -1.8, -1.6, 0.2];

@@ -132,8 +132,7 @@ pub struct DepthsEstimate {
 /// With `p` the reported tip position in the base, the true tip pose is `base_from_tip * E`: `E` has the translation
 /// `position_slopes (p - origin_m)` in metres and the rotation vector `orientation_slopes_rad_per_m (p - origin_m)` in radians, both in
 /// the axes of the tip; those in the axes of the base, with the reported rotation `R`, add `Rᵀ position_slopes_in_base (p - origin_m)`
-/// and likewise. Where `p` is farther from the
-/// origin than `reach_m` nothing is known, and `p - origin_m` is shortened to that length.
+/// and likewise. Where `p` is farther from the origin than `reach_m` nothing is known, and `p - origin_m` is shortened to that length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PoseDependentErrorEstimate {
     /// Where the field is zero, in the base, metres: the middle of the session's tip positions.

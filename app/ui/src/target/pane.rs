@@ -4,6 +4,7 @@ use egui::{DragValue, Ui};
 use handeye_dataset::CameraInput;
 use handeye_estimate::handeye::Mode;
 use handeye_geometry::camera::{Distortion, Intrinsics};
+use handeye_geometry::observations::LENS_ACCURACY_PX;
 
 use super::board::{board_ui, number_ui};
 use crate::style::theme::{Palette, Tone};
@@ -119,7 +120,8 @@ fn camera_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
              sheet or another program. The expected error counts it. At 0 they are taken as exact."
         ));
     });
-    let accuracy = Some(accuracy).filter(|px| *px > 0.0);
+    // Less is exact, and shown so.
+    let accuracy = Some(accuracy).filter(|px| px >= LENS_ACCURACY_PX.start());
     if now != before || accuracy != accuracy_px {
         let known = CameraInput { fixed: true, accuracy_px: accuracy, intrinsics: Some(now), model: now.distortion };
         outbox.send(session::Command::SetCamera(Some(known)));
