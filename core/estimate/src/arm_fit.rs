@@ -5,12 +5,13 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::ShapeEstimate;
 use crate::handeye::joint::{
-    self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, SmallSample, with_shown_field,
+    self, ArmErrors, Free, JointProblem, JointSolution, Noise, SIZE_SIGMA, ShownEffects, SmallSample, with_shown_field,
 };
 use crate::handeye::{HandEye, HandEyeError, determined};
 use crate::resolution;
 use crate::size::LEAST_SCALE;
 use crate::stated_uncertainty::Alternative;
+use crate::uncertainty::overdispersion;
 use crate::uncertainty::quality::{self, PredictedBy};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::progress::Work;
@@ -151,6 +152,7 @@ fn by_chance(views: usize) -> f64 {
 pub(crate) fn arm_fit(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
+    shown: ShownEffects<'_>,
     work: &Work<'_>,
 ) -> Result<Option<ArmFit>, HandEyeError> {
     let with = JointProblem { free: Free { arm: true, field: false, ..problem.free }, ..*problem };
@@ -164,6 +166,9 @@ pub(crate) fn arm_fit(
         None => (with, fit),
     };
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
+    let (mut fit, _) = shown.with_their_error(&with, fit, work.cancel)?;
+    // What views disagree about does not count less where the joints are known.
+    fit.widen(&overdispersion::check(&with, &fit, shown, work.cancel)?);
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
     let heldout = quality::compared((problem, solution), (&with, &fit), PredictedBy::Links, work.cancel)?;
     let contradicted = match heldout.filter(|heldout| heldout.is_worse) {

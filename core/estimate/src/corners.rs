@@ -202,10 +202,12 @@ impl Session<'_> {
         }
         let mut calibration = std::mem::take(&mut self.calibration);
         let problem = self.problem(&refined, &fitted, lens);
-        let judged = refine::judge(&problem, &mut refined.screened.solution, work)?;
+        let mut solution = refined.screened.solution.clone();
+        let judged = refine::judge(&problem, &mut solution, refined.shown(), work)?;
+        refined.screened.solution = solution;
         take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
         if let Some(joint) = &mut calibration.joint {
-            joint.arm = arm_fit(&problem, &refined.screened.solution, work)?;
+            joint.arm = arm_fit(&problem, &refined.screened.solution, refined.shown(), work)?;
             joint.known_lens = self.lens.known.filter(|_| lens.is_some());
             let solution = &refined.screened.solution;
             let widened = joint.widening.factor;

@@ -10,11 +10,11 @@ use crate::handeye::consensus::{Consensus, consensus};
 use crate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::print_errors::{self, with_shown_print};
-use crate::handeye::joint::residual_distortion::{corrected, with_its_error, with_shown_distortion};
+use crate::handeye::joint::residual_distortion::{corrected, with_shown_distortion};
 use crate::handeye::joint::with_depths::{OtherModel, with_depths};
 use crate::handeye::joint::{
     self, CornerWeights, DepthWeight, Free, JointProblem, JointSolution, JointStart, PrintErrors, ShownDistortion,
-    with_shown_field,
+    ShownEffects, with_shown_field,
 };
 use crate::handeye::numbering::Turns;
 use crate::handeye::{HandEyeError, PosePair, determined};
@@ -166,6 +166,11 @@ impl Refined {
         Ok(self)
     }
 
+    /// The effects that are in the model.
+    pub fn shown(&self) -> ShownEffects<'_> {
+        ShownEffects { print: self.print.as_ref(), distortion: self.distortion.as_ref() }
+    }
+
     /// See [`JointProblem::depth`].
     pub fn depth_weight(&self) -> Option<DepthWeight> {
         self.depths.and_then(|depths| depths.weight())
@@ -183,13 +188,11 @@ impl Refined {
         if let Some(other) = &self.other_depths {
             self.screened.solution.covariance = other.mixed(&self.screened.solution.covariance);
         }
-        if let Some(shown) = &mut self.print {
-            let solution = self.screened.solution.clone();
-            self.screened.solution = print_errors::with_its_error(problem, solution, shown, work.cancel)?;
-        }
-        if let Some(shown) = &self.distortion {
-            let solution = self.screened.solution.clone();
-            self.screened.solution = with_its_error(problem, solution, shown, work.cancel)?;
+        let stated = self.screened.solution.clone();
+        let (stated, sigma_m) = self.shown().with_their_error(problem, stated, work.cancel)?;
+        self.screened.solution = stated;
+        if let Some(print) = &mut self.print {
+            print.sigma_m = sigma_m;
         }
         Ok(self)
     }
@@ -238,7 +241,7 @@ fn bent(
     let Some(mut solution) = determined(stated)? else { return Ok(None) };
     if let Some(print) = print {
         // What the print is not known to is not known of the bend either.
-        solution = print_errors::with_its_error(&with_warp, solution, &mut print.clone(), work.cancel)?;
+        solution = print_errors::with_its_error(&with_warp, solution, print, work.cancel)?.0;
     }
     let Some(covariance) = solution.warp_covariance() else { return Ok(None) };
     let metres_per_px = solution.reference_point.coords.norm() / solution.intrinsics.fx;
@@ -325,11 +328,12 @@ pub struct Judged {
 pub fn judge(
     problem: &JointProblem<'_>,
     solution: &mut JointSolution,
+    shown: ShownEffects<'_>,
     work: &Work<'_>,
 ) -> Result<Judged, HandEyeError> {
     let heldout = quality::held_out(problem, solution, *work)?;
     let expected = joint::prediction::expected_residuals(problem, solution, *work)?;
-    let widening = overdispersion::check(problem, solution, work.cancel)?;
+    let widening = overdispersion::check(problem, solution, shown, work.cancel)?;
     let size = size::size(problem, solution, work.cancel)?;
     // Where the answer takes a wrong size for true its scatter is that of the size, and no reason to doubt another one.
     let size = if problem.free.scale { size.map(|size| size.widened(widening.factor)) } else { size };

@@ -56,7 +56,7 @@ pub struct OverdispersionRecord {
     pub factor: f64,
     /// Which evidence asked for it, or which was looked at in vain.
     pub by: String,
-    /// By how much standard deviations of an estimated lens were widened besides, above 1, because the views disagree about it.
+    /// By how much standard deviations of an estimated lens were widened besides, above 1, as far as the views disagree about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_factor: Option<f64>,
 }

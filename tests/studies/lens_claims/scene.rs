@@ -40,6 +40,8 @@ pub struct Scene {
     pub beside: f64,
     /// Deflection of the middle of the board, metres.
     pub bend_m: f64,
+    /// What every point of the board is off its drawing within its plane, per axis, metres.
+    pub print_m: f64,
     /// fx over fy, less one, of images that were scaled in one direction.
     pub aspect: f64,
 }
@@ -58,6 +60,7 @@ impl Scene {
             roll_deg: 60.0,
             beside: 0.15,
             bend_m: 0.0,
+            print_m: 0.0,
             aspect: 0.0,
         }
     }
@@ -84,11 +87,14 @@ impl Scene {
         };
         let links = links(rng, self.mode);
         let waves = Waves::draw(rng, self.waves_m);
+        // With numbers of their own, so that they change nothing else.
+        let mut of_print = ChaCha8Rng::seed_from_u64(seed ^ 0xb0a4d);
+        let print = (0..COLUMNS * ROWS).map(|_| self.print_m * normal3(&mut of_print)).collect::<Vec<_>>();
         let mut views = Vec::new();
         while views.len() < self.views {
             let camera_from_target = self.seen_at(rng);
             let true_tip = *links.base_from_tip(&Pose::from_isometry(camera_from_target)).isometry();
-            let Some(corners) = self.corners(rng, &lens, &camera_from_target) else { continue };
+            let Some(corners) = self.corners(rng, &lens, &print, &camera_from_target) else { continue };
             let noise = Isometry3::new(normal3(rng) * self.robot.0, normal3(rng) * self.robot.1);
             let reported = Pose::from_isometry(true_tip * waves.at(&true_tip) * noise);
             views.push(ObservedView::new(format!("{:03}", views.len()), Some(reported), Some(corners.into())));
@@ -113,6 +119,7 @@ impl Scene {
         &self,
         rng: &mut ChaCha8Rng,
         lens: &Intrinsics,
+        print: &[Vector3<f64>],
         camera_from_target: &Isometry3<f64>,
     ) -> Option<Vec<Corner>> {
         let shared: [Vector2<f64>; 6] =
@@ -123,7 +130,9 @@ impl Scene {
                 let (u, v) =
                     (2.0 * column as f64 / (COLUMNS - 1) as f64 - 1.0, 2.0 * row as f64 / (ROWS - 1) as f64 - 1.0);
                 let height = self.bend_m * (1.0 - u * u);
-                let point = Point3::new(column as f64 * SQUARE_M, row as f64 * SQUARE_M, height);
+                let printed = print[row * COLUMNS + column].xy();
+                let point =
+                    Point3::new(column as f64 * SQUARE_M + printed.x, row as f64 * SQUARE_M + printed.y, height);
                 let px = pixel(lens, &(camera_from_target * point))?;
                 let inside = px.min() > 2.0 && px.x < f64::from(SIZE.0) - 3.0 && px.y < f64::from(SIZE.1) - 3.0;
                 if !inside {

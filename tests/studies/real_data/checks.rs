@@ -1,6 +1,6 @@
 //! What the checks of the stated uncertainty say of every set.
 
-use handeye_estimate::handeye::joint::Free;
+use handeye_estimate::handeye::joint::{Free, ShownEffects};
 use handeye_estimate::uncertainty::{overdispersion, quality};
 use handeye_geometry::progress::CancelToken;
 
@@ -22,7 +22,8 @@ pub fn run(set: &Set) {
         };
         let (problem, solution) = (kept.problem(set), &kept.solution);
         let before = std::time::Instant::now();
-        let widening = match overdispersion::check(&problem, solution, &CancelToken::default()) {
+        let widening = match overdispersion::check(&problem, solution, ShownEffects::default(), &CancelToken::default())
+        {
             Ok(widening) => widening,
             Err(error) => {
                 println!("{}: {error}", set.name);

@@ -1,130 +1,163 @@
-//! Whether the answers of random halves agree as well as they say.
+//! Whether the answers of random halves agree as well as they say, each calibrated and examined as the command line does it.
 
-use handeye_estimate::handeye::joint::{Free, JointSolution, SmallSample};
-use handeye_estimate::uncertainty::{overdispersion, quality};
+use handeye_estimate::diagnose::{Calibration, calibrate};
+use handeye_estimate::{CameraKnowledge, Method, Observations, ObservedView};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
-use nalgebra::{Matrix6, Point3};
+use nalgebra::Vector6;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use crate::methods::Choice;
+use crate::methods::MANY;
 use crate::sets::Set;
 
-/// An answer and by how much its covariance has to be widened.
-struct Half {
-    solution: JointSolution,
-    factor: f64,
+/// Standard deviations within which two answers that differ by chance alone are in 95 %.
+const WITHIN: f64 = 1.96;
+/// Numbers of a lens that are compared: fx, fy, cx, cy.
+const LENS_NUMBERS: usize = 4;
+
+/// How many were within, of how many.
+#[derive(Default, Clone, Copy)]
+struct Share {
+    within: usize,
+    of: usize,
 }
 
-impl Half {
-    fn new(set: &Set, views: &[usize], free: Free) -> Option<Self> {
-        let kept = Choice::new(set, views).joint(set, free)?;
-        let widening = overdispersion::check(&kept.problem(set), &kept.solution, &CancelToken::default()).ok()?;
-        Some(Self { solution: kept.solution, factor: widening.factor })
+impl Share {
+    fn add(&mut self, within: bool) {
+        self.within += usize::from(within);
+        self.of += 1;
     }
 
-    /// Covariance in the units of its distribution.
-    fn covariance(&self) -> Matrix6<f64> {
-        self.solution.hand_eye_covariance() / self.solution.small_sample.scale
+    fn together(self, other: Self) -> Self {
+        Self { within: self.within + other.within, of: self.of + other.of }
+    }
+
+    fn percent(self) -> String {
+        if self.of == 0 { "–".to_owned() } else { format!("{:.1}", 100.0 * self.within as f64 / self.of as f64) }
     }
 }
 
-/// Degrees of freedom of the sum of two covariances, by Welch and Satterthwaite in the mean over the directions of the sum.
-fn degrees(a: &Half, b: &Half) -> f64 {
-    let (ca, cb) = (a.covariance(), b.covariance());
-    let Some(inverse) = (ca + cb).try_inverse() else { return f64::NAN };
-    let share = |c: Matrix6<f64>| (inverse * c).trace() / 6.0;
-    let of = |half: &Half, c| share(c).powi(2) / half.solution.small_sample.degrees_of_freedom;
-    (of(a, ca) + of(b, cb)).recip()
-}
-
-/// How often two halves agreed.
+/// What pairs of halves showed.
 #[derive(Default)]
-struct Agreement {
-    splits: usize,
-    region: usize,
-    tip: usize,
+pub struct Agreement {
+    translation: Share,
+    rotation: Share,
+    lens: Share,
+    /// Errors of a measured point against the root of the sum of the squares of what both state.
+    point: Share,
+    /// Halves for which nothing was stated, of all.
+    silent: Share,
+    apart_m: Vec<f64>,
 }
 
 impl Agreement {
-    fn add(&mut self, difference: &nalgebra::Vector6<f64>, covariance: &Matrix6<f64>, degrees: f64, at: &Point3<f64>) {
-        let Some(inverse) = covariance.try_inverse() else { return };
-        let limit = if degrees < 1e6 {
-            FisherSnedecor::new(6.0, degrees).map_or(f64::NAN, |law| law.inverse_cdf(0.95))
-        } else {
-            // Chi-square with six degrees of freedom.
-            12.591_587 / 6.0
-        };
-        self.splits += 1;
-        self.region += usize::from(difference.dot(&(inverse * difference)) / 6.0 <= limit);
-        let moved = difference.fixed_rows::<3>(0) + difference.fixed_rows::<3>(3).cross(&at.coords);
-        self.tip += usize::from(
-            moved.norm()
-                <= quality::tip_error_95_at(
-                    covariance,
-                    SmallSample { degrees_of_freedom: degrees, ..SmallSample::KNOWN },
-                    at,
-                ),
-        );
+    fn add(&mut self, [a, b]: &[Option<Calibration>; 2]) {
+        for half in [a, b] {
+            self.silent.add(half.as_ref().and_then(Calibration::tip_error_95_m).is_none());
+        }
+        let (Some(a), Some(b)) = (a, b) else { return };
+        let Some((difference, at)) = difference(a, b) else { return };
+        let moved_m = (difference.fixed_rows::<3>(0) + difference.fixed_rows::<3>(3).cross(&at.coords)).norm();
+        self.apart_m.push(moved_m);
+        // Where the data contradict themselves nothing is said that could be wrong.
+        let (Some(of_a), Some(of_b)) = (a.tip_error_95_m(), b.error_95_m(&at)) else { return };
+        self.point.add(moved_m <= of_a.hypot(of_b));
+        if let (Some(ca), Some(cb)) = (a.link_covariances(), b.link_covariances()) {
+            for k in 0..6 {
+                let share = if k < 3 { &mut self.translation } else { &mut self.rotation };
+                share.add(difference[k].abs() <= WITHIN * (ca.hand_eye[(k, k)] + cb.hand_eye[(k, k)]).sqrt());
+            }
+        }
+        for k in 0..LENS_NUMBERS {
+            if let (Some((a, of_a)), Some((b, of_b))) = (lens(a, k), lens(b, k)) {
+                self.lens.add((a - b).abs() <= WITHIN * of_a.hypot(of_b));
+            }
+        }
     }
 
-    fn print(&self) {
-        let share = |n: usize| n as f64 / self.splits.max(1) as f64 * 100.0;
-        print!(" {:.0} % | {:.0} % |", share(self.region), share(self.tip));
+    pub fn together(mut self, mut other: Self) -> Self {
+        self.apart_m.append(&mut other.apart_m);
+        Self {
+            translation: self.translation.together(other.translation),
+            rotation: self.rotation.together(other.rotation),
+            lens: self.lens.together(other.lens),
+            point: self.point.together(other.point),
+            silent: self.silent.together(other.silent),
+            apart_m: self.apart_m,
+        }
     }
+
+    pub fn print(&mut self, name: &str, camera: &str) {
+        self.apart_m.sort_by(f64::total_cmp);
+        let median_m = self.apart_m.get(self.apart_m.len() / 2).copied().unwrap_or(f64::NAN);
+        println!(
+            "| {name} | {camera} | {} | {} | {} | {} | {:.3} | {} |",
+            self.translation.percent(),
+            self.rotation.percent(),
+            self.lens.percent(),
+            self.point.percent(),
+            median_m * 1e3,
+            self.silent.percent(),
+        );
+    }
+}
+
+/// By how much two answers differ, `log(A⁻¹ B)`, and a point where the first saw the target.
+fn difference(a: &Calibration, b: &Calibration) -> Option<(Vector6<f64>, nalgebra::Point3<f64>)> {
+    let of = |calibration: &Calibration| Some(calibration.hand_eye.as_ref()?.mount_from_camera());
+    Some((se3::log((of(a)?.inverse() * of(b)?).isometry()), a.joint.as_ref()?.reference_point))
+}
+
+/// A number of the lens that was estimated, and its standard deviation.
+fn lens(calibration: &Calibration, k: usize) -> Option<(f64, f64)> {
+    /// Where the lens begins among the unknowns that the covariance is of.
+    const LENS_AT: usize = 12;
+    let joint = calibration.joint.as_ref().filter(|joint| joint.free.intrinsics)?;
+    Some((calibration.intrinsics()?.parameters()[k], joint.covariance[(LENS_AT + k, LENS_AT + k)].sqrt()))
 }
 
 /// Head of the table.
 pub fn header() {
     println!(
-        "| set | model | region | tip | region, widened | tip, widened | halves widened | mm apart at the board | splits |"
+        "| set | camera | translation % | rotation % | fx, fy, cx, cy % | point % | apart, mm | nothing stated % |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|");
 }
 
-pub fn run(set: &Set, splits: usize) {
-    if !set.has_corners() {
-        return;
-    }
-    let mut variants = vec![("joint", Free::default())];
-    variants.extend(crate::methods::variants(set).filter(|(_, free)| !free.warp));
-    for (name, free) in variants {
+/// Random divisions of a set, and what those with the lens as given and those with an estimated one show together.
+pub fn run(set: &Set, splits: usize) -> Agreement {
+    let mut of_all = Agreement::default();
+    for (camera, given) in [("given", true), ("estimated", false)] {
+        if !set.has_corners() || !given && set.views.len() < MANY {
+            continue;
+        }
         let mut rng = ChaCha8Rng::seed_from_u64(100);
         let mut order: Vec<usize> = (0..set.views.len()).collect();
-        let (mut stated, mut widened) = (Agreement::default(), Agreement::default());
-        let (mut failed, mut widened_halves, mut apart_m) = (0, 0, 0.0);
+        let mut agreement = Agreement::default();
         for _ in 0..splits {
             order.shuffle(&mut rng);
             let (a, b) = order.split_at(order.len() / 2);
-            let sorted = |part: &[usize]| {
-                let mut part = part.to_vec();
-                part.sort_unstable();
-                part
-            };
-            let (Some(a), Some(b)) = (Half::new(set, &sorted(a), free), Half::new(set, &sorted(b), free)) else {
-                failed += 1;
-                continue;
-            };
-            let (x, y) = (a.solution.hand_eye.mount_from_camera(), b.solution.hand_eye.mount_from_camera());
-            let difference = se3::log((x.inverse() * y).isometry());
-            let at = a.solution.reference_point;
-            let degrees = degrees(&a, &b);
-            stated.add(&difference, &(a.covariance() + b.covariance()), degrees, &at);
-            widened.add(&difference, &(a.covariance() * a.factor + b.covariance() * b.factor), degrees, &at);
-            widened_halves += usize::from(a.factor > 1.0) + usize::from(b.factor > 1.0);
-            apart_m += (difference.fixed_rows::<3>(0) + difference.fixed_rows::<3>(3).cross(&at.coords)).norm();
+            agreement.add(&[a, b].map(|half| calibrated(set, half, given)));
         }
-        print!("| {} | {name} |", set.name);
-        stated.print();
-        widened.print();
-        let done = splits - failed;
-        println!(
-            " {:.0} % | {:.3} | {done} |",
-            widened_halves as f64 / (2 * done).max(1) as f64 * 100.0,
-            apart_m / done.max(1) as f64 * 1e3
-        );
+        agreement.print(&set.name, camera);
+        of_all = of_all.together(agreement);
     }
+    of_all
+}
+
+/// A half, in the order in which it was captured.
+fn calibrated(set: &Set, half: &[usize], given: bool) -> Option<Calibration> {
+    let mut half = half.to_vec();
+    half.sort_unstable();
+    let camera = if given { CameraKnowledge::Fixed(set.intrinsics) } else { CameraKnowledge::NOTHING };
+    let observations = Observations {
+        mode: Some(set.mode),
+        target: set.target.clone(),
+        image_size: set.image_size,
+        camera,
+        views: half.iter().map(|view| ObservedView::from(&set.views[*view])).collect(),
+    };
+    calibrate(&observations, Method::Joint, &CancelToken::default()).ok()
 }

@@ -28,16 +28,20 @@ fn main() -> ExitCode {
     if what == "halves" {
         halves::header();
     }
+    let mut of_all = halves::Agreement::default();
     for set in sets::all(&data, chosen) {
         match what {
             "folds" => folds::run(&set, divisions.unwrap_or(20)),
-            "halves" => halves::run(&set, divisions.unwrap_or(100)),
+            "halves" => of_all = of_all.together(halves::run(&set, divisions.unwrap_or(100))),
             "checks" => checks::run(&set),
             other => {
                 println!("{other:?} is none of folds, halves, checks");
                 return ExitCode::FAILURE;
             }
         }
+    }
+    if what == "halves" {
+        of_all.print("all", "");
     }
     ExitCode::SUCCESS
 }

@@ -52,7 +52,7 @@ const VARIANTS: [(&str, Free); 5] = [
 const FIXED: Free = Free { intrinsics: false, warp: false, scale: false, arm: false, field: false, depth: false };
 
 /// Fewest views from which camera and warp are freed.
-const MANY: usize = 12;
+pub const MANY: usize = 12;
 
 /// What may be freed for a set: the scale always, the camera where there are views enough.
 pub fn variants(set: &Set) -> impl Iterator<Item = (&'static str, Free)> {

@@ -8,6 +8,7 @@ use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
 use handeye_geometry::targets::bent::BoardPoints;
 use handeye_geometry::targets::observation::{Corner, View};
+use handeye_geometry::targets::{AprilTag, Grid, TargetSpec};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use serde_json::Value;
 
@@ -15,6 +16,9 @@ use serde_json::Value;
 pub struct Set {
     pub name: String,
     pub mode: Mode,
+    pub target: TargetSpec,
+    /// Width and height; with sets that do not state it twice the principal point.
+    pub image_size: (u32, u32),
     pub board: BoardPoints,
     /// Empty corners where the set has pose pairs only.
     pub views: Vec<View>,
@@ -76,18 +80,54 @@ fn load(data: &Path, name: &str) -> Set {
     let mut intrinsics = Intrinsics::pinhole(1, 1, 1.0);
     (intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy) = (k[0], k[4], k[2], k[5]);
     intrinsics.distortion = Distortion::BrownConrady([0.0; 5]).with_coefficients(&d);
-    let (points, mut by_image) = corners(&folder, &json);
+    let (mut points, mut by_image) = corners(&folder, &json);
+    if json["board"]["type"] == "apriltag" {
+        points.swap(2, 3);
+    }
     let (mut views, mut pairs) = (Vec::new(), Vec::new());
     for view in json["views"].as_array().expect("views.json has views") {
         let image = view["image"].as_str().expect("every view has an image").to_owned();
         let base_from_tip: Pose<Base, Tip> = pose(&view["base_T_gripper"]);
         let camera_from_target: Pose<Camera, Target> = pose(&view["cam_T_target"]);
         pairs.push(PosePair { anchor_from_mount: mode.anchor_from_mount(&base_from_tip), camera_from_target });
-        let found = by_image.remove(&image).expect("every view has corners");
+        let mut found = by_image.remove(&image).expect("every view has corners");
+        if json["board"]["type"] == "apriltag" {
+            // The file goes around the tag, a target runs row by row.
+            found.swap(2, 3);
+            for (index, corner) in found.iter_mut().enumerate() {
+                corner.index = index;
+            }
+        }
         views.push(View::new(image, base_from_tip, found));
     }
     let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64);
-    Set { name: name.to_owned(), mode, board: BoardPoints::new(&points), views, pairs, intrinsics, centre }
+    let image_size = match &json["image_size"] {
+        Value::Array(size) => (size[0].as_u64().expect("width") as u32, size[1].as_u64().expect("height") as u32),
+        _ => ((2.0 * intrinsics.cx).round() as u32, (2.0 * intrinsics.cy).round() as u32),
+    };
+    (intrinsics.width, intrinsics.height) = image_size;
+    let (target, board) = (target(&json["board"]), BoardPoints::new(&points));
+    Set { name: name.to_owned(), mode, target, image_size, board, views, pairs, intrinsics, centre }
+}
+
+/// What the corners of a set are those of.
+fn target(board: &Value) -> TargetSpec {
+    let count = |name: &str| board[name].as_u64().expect("the board has a size") as usize;
+    let length = |name: &str| board[name].as_f64().expect("the board has lengths");
+    match board["type"].as_str() {
+        Some("apriltag") => {
+            let family = "36h11".parse().expect("a family");
+            TargetSpec::AprilTag(AprilTag { tag_m: length("size_m"), id: 0, family, border_bits: None })
+        }
+        Some("circle_grid_modified") => {
+            TargetSpec::Circles(Grid { columns: count("cols"), rows: count("rows"), square_m: length("spacing_m") })
+        }
+        _ => TargetSpec::Chessboard(Grid {
+            columns: count("inner_cols"),
+            rows: count("inner_rows"),
+            square_m: length("square_m"),
+        }),
+    }
 }
 
 /// Pairs `[base_T_eef, cam_T_target]` without corners.
@@ -104,7 +144,9 @@ fn pose_pairs(folder: &Path, name: &str) -> Set {
         .collect();
     let intrinsics = Intrinsics::pinhole(1, 1, 1.0);
     let (board, views, centre) = (BoardPoints::new(&[]), Vec::new(), Point3::origin());
-    Set { name: name.to_owned(), mode, board, views, pairs, intrinsics, centre }
+    // The distances between its points are nowhere asked for.
+    let target = TargetSpec::Chessboard(Grid { columns: 0, rows: 0, square_m: 1.0 });
+    Set { name: name.to_owned(), mode, target, image_size: (1, 1), board, views, pairs, intrinsics, centre }
 }
 
 /// Corners per image: from `points.csv` (own target points) or `corners.csv` (chessboard, the detector of `views.json`).

@@ -18,6 +18,8 @@
 //! & McCaffrey 2002, "Bias reduction in standard errors for linear regression with multi-stage samples" (leverage,
 //! degrees of freedom); Rao 1948 (a parameter judged without a fit that has it).
 
+use std::borrow::Borrow;
+
 use nalgebra::{DMatrix, DVector, Vector2};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
@@ -156,7 +158,7 @@ impl Evidence {
 /// How views scatter in `count` unknowns from the column `first` on, for corners of variance 1: `covariance` is `C` and `step`
 /// is `b`. `None` where the unknowns are not determined.
 pub(crate) fn scatter(
-    scores: &[Score],
+    scores: impl IntoIterator<Item: Borrow<Score>>,
     covariance: &DMatrix<f64>,
     step: &DVector<f64>,
     (first, count): (usize, usize),
@@ -169,6 +171,7 @@ pub(crate) fn scatter(
     let (mut shown, mut expected, mut squared) = (0.0, 0.0, 0.0);
     let mut taken = DMatrix::zeros(step.len(), step.len());
     for score in scores {
+        let score: &Score = score.borrow();
         let by_view = &whitened * &score.information;
         let alone = &by_view * whitened.transpose();
         let leverage = &by_view * covariance * by_view.transpose();

@@ -260,7 +260,7 @@ fn fitted(
     let factor = if let Some(factor) = factor {
         factor
     } else {
-        let widening = overdispersion::check(&problem, solution, work.cancel)?;
+        let widening = overdispersion::check(&problem, solution, refined.shown(), work.cancel)?;
         widening.factor * widening.lens
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.

@@ -8,6 +8,7 @@ use handeye_estimate::diagnose::doctor::Diagnosis;
 use handeye_estimate::diagnose::findings::{Finding, FindingCode, Severity};
 use handeye_estimate::diagnose::{Calibration, calibrate};
 use handeye_estimate::handeye::Mode;
+use handeye_estimate::uncertainty::overdispersion::Evidence;
 use handeye_estimate::{Method, Observations};
 use handeye_geometry::progress::CancelToken;
 use scene::Scene;
@@ -112,5 +113,26 @@ fn fx_and_fy_of_a_camera_are_not_accused_where_views_tell_them_badly() {
                 assert!(accused.is_none(), "{mode:?} {seed}: {accused:?}");
             }
         }
+    }
+}
+
+/// Errors that the corners of a view share make the lens less known than independent corners say, and few views do not refute that.
+#[test]
+fn what_views_say_of_the_lens_counts_where_their_corners_err_alike() {
+    for print_m in [0.0, 1e-4] {
+        let checked = |shared_px: f64, seed: u64| {
+            let scene = Scene { shared_px, print_m, ..Scene::new(Mode::EyeInHand, 8) };
+            let (calibration, _) = examined(&scene.draw(seed).unknown());
+            let joint = calibration.joint.as_ref().expect("of the joint estimate");
+            assert_eq!(joint.print.is_some(), print_m > 0.0, "the print shows where it is off");
+            let check = joint.widening.checks.iter().find(|check| check.by == Evidence::Lens).expect("it is estimated");
+            assert_eq!(joint.widening.lens, check.ratio.max(1.0));
+            check.ratio
+        };
+        let mean = |shared_px| (0..6).map(|seed| checked(shared_px, seed)).sum::<f64>() / 6.0;
+        let (alike, independent) = (mean(0.1), mean(0.0));
+        // One is right where corners err independently; six of some thirty degrees of freedom scatter by a tenth.
+        assert!((0.6..1.4).contains(&independent), "{independent}");
+        assert!(alike > 1.4, "{alike} where corners err alike");
     }
 }

@@ -3,6 +3,7 @@
 
 use super::{Finding, FindingCode, Severity, listed};
 use crate::diagnose::Calibration;
+use crate::uncertainty::overdispersion::Evidence;
 use crate::{JointFit, ViewResult, ViewStatus, resolution};
 use handeye_wording::text;
 use handeye_wording::{Text, shown};
@@ -151,8 +152,10 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
 
 /// An estimated lens that single views pull about by more than their noise.
 fn lens_widened(calibration: &Calibration) -> Option<Finding> {
-    let times = calibration.joint.as_ref()?.widening.lens.sqrt();
-    if times < WIDENING_WORTH_SAYING {
+    let widening = &calibration.joint.as_ref()?.widening;
+    let times = widening.lens.sqrt();
+    let disagree = widening.checks.iter().any(|check| check.by == Evidence::Lens && check.is_significant());
+    if !disagree || times < WIDENING_WORTH_SAYING {
         return None;
     }
     let text = text!(

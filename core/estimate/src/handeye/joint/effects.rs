@@ -17,11 +17,12 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix6xX};
 
-use super::normal::Reduced;
+use super::normal::{Reduced, System};
 use super::state::State;
-use super::view_block::{Layout, Own, PixelWeights, ViewBlock, whitened};
+use super::view_block::{Layout, Own, PixelWeights, ViewBlock, prior_weight, whitened};
 use super::{JointProblem, JointSolution, Noise};
 use crate::handeye::HandEyeError;
+use crate::intrinsics::evidence::Score;
 use handeye_geometry::camera::residual_distortion::{basis, functions};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::targets::observation::Corner;
@@ -69,6 +70,37 @@ pub struct Equations {
     pub residuals: f64,
 }
 
+/// What a view says of the shared unknowns and, behind them, of the coefficients of effects, its correction eliminated. `None` where
+/// the view says nothing.
+pub fn score(
+    problem: &JointProblem<'_>,
+    state: &State,
+    system: &System,
+    noise: &Noise,
+    effects: &[Effect],
+    index: usize,
+) -> Option<Score> {
+    let (block, correction) = (&system.blocks[index], &system.corrections[index]);
+    let (information, gradient) = block.information(noise, correction)?;
+    if effects.is_empty() {
+        return Some(Score { information, gradient });
+    }
+    let products = Products::new(problem, state, index, effects)?;
+    let own = Own::new(block, correction, PixelWeights::new(noise).pose, &prior_weight(noise), 0.0)?;
+    let (n, k) = (gradient.len(), products.own.nrows());
+    let mut of_effects =
+        Sums { information: DMatrix::zeros(k, k), gradient: DVector::zeros(k), cross: DMatrix::zeros(n, k) };
+    of_effects.add(&products, block, &own, noise);
+    let mut all = DMatrix::zeros(n + k, n + k);
+    all.view_mut((0, 0), (n, n)).copy_from(&information);
+    all.view_mut((0, n), (n, k)).copy_from(&of_effects.cross);
+    all.view_mut((n, 0), (k, n)).copy_from(&of_effects.cross.transpose());
+    all.view_mut((n, n), (k, k)).copy_from(&of_effects.information);
+    let mut pull = gradient.resize_vertically(n + k, 0.0);
+    pull.rows_mut(n, k).copy_from(&of_effects.gradient);
+    Some(Score { information: all, gradient: pull })
+}
+
 /// An effect at the level that it most likely has.
 pub struct MostLikely {
     pub level: f64,
@@ -101,7 +133,7 @@ impl Equations {
             if cancel.is_cancelled() {
                 return Err(HandEyeError::Cancelled);
             }
-            let Some(products) = Products::new(problem, &state, index, effect) else { return Ok(None) };
+            let Some(products) = Products::new(problem, &state, index, &[effect]) else { return Ok(None) };
             let (block, own) = (&system.blocks[index], &reduced.own[index]);
             sums.add(&products, block, own, noise);
         }
@@ -243,126 +275,165 @@ struct Products {
 }
 
 impl Products {
-    /// `None` where a corner has no image.
-    fn new(problem: &JointProblem<'_>, state: &State, index: usize, effect: Effect) -> Option<Self> {
+    /// Of several effects, one behind the other; `None` where a corner has no image.
+    fn new(problem: &JointProblem<'_>, state: &State, index: usize, effects: &[Effect]) -> Option<Self> {
         let view = &problem.views[index];
         let chain = state.chain(problem, view, &state.corrections[index]);
         let whitener = problem.whitener(view);
         let seen = problem.seen(state, view, &whitener);
         let rows = Rows::new(&seen, &chain.camera_from_target, problem.free.form());
-        match (effect, &whitener) {
-            (_, Whitener::Together { .. }) => Self::of_corners_together(&seen, &rows, effect),
-            (Effect::Distortion(degree), _) => Self::of_distortion(&seen, &rows, degree),
-            (Effect::Print, _) => Self::of_print(&seen, &rows),
-        }
-    }
-
-    /// Where the corners of the view do not err independently: every column takes up all rows.
-    fn of_corners_together(seen: &ViewInput<'_>, rows: &Rows<'_>, effect: Effect) -> Option<Self> {
-        let size = (seen.intrinsics.width, seen.intrinsics.height);
-        let points = seen.board.len();
-        let (count, all) = match effect {
-            Effect::Distortion(degree) => {
-                let f = functions(degree);
-                let fill = |corner: &Corner, _: &[Pair], columns: &mut [Pair]| {
-                    for (k, value) in basis(size, degree, &corner.px).into_iter().enumerate() {
-                        columns[k] = [value, 0.0];
-                        columns[f + k] = [0.0, value];
-                    }
-                };
-                (2 * f, rows.all(2 * f, fill))
-            }
-            Effect::Print => {
-                let fill = |corner: &Corner, row: &[Pair], columns: &mut [Pair]| {
-                    columns[corner.index] = by_point(row[0], seen);
-                    columns[points + corner.index] = by_point(row[1], seen);
-                };
-                (2 * points, rows.all(2 * points, fill))
-            }
-        };
-        let all = all.ok()?;
-        let columns = all.ncols() - count;
-        let effect = all.columns(columns, count);
-        Some(Self::of(&all.columns(0, columns).tr_mul(&effect), effect.tr_mul(&effect)))
-    }
-
-    fn of_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option<Self> {
-        let (n, f) = (seen.corners.len(), functions(degree));
-        let columns = POSE + rows.count + 1;
-        let size = (seen.intrinsics.width, seen.intrinsics.height);
-        let mut functions = DMatrix::zeros(f, n);
-        let mut weights = [vec![1.0; n], vec![0.0; n], vec![1.0; n]];
-        let mut others: [DMatrix<f64>; 2] = std::array::from_fn(|_| DMatrix::zeros(columns, n));
-        let mut row = [Pair::default(); POSE + MAX_FORM + 1];
-        for (i, corner) in seen.corners.iter().enumerate() {
-            rows.fill(i, corner, &mut row).ok()?;
-            let basis = DVector::from_vec(basis(size, degree, &corner.px));
-            let [[a, b], [c, d]] =
-                seen.whitener.of(i).map_or([[1.0, 0.0], [0.0, 1.0]], |w| [[w.m11, w.m12], [w.m21, w.m22]]);
-            for (weights, weight) in weights.iter_mut().zip([a * a + c * c, a * b + c * d, b * b + d * d]) {
-                weights[i] = weight;
-            }
-            functions.set_column(i, &basis);
-            for (j, [x, y]) in row[..columns].iter().enumerate() {
-                others[0][(j, i)] = a * x + c * y;
-                others[1][(j, i)] = b * x + d * y;
-            }
-        }
-        let transposed = functions.transpose();
-        let weighed = |weights: &[f64]| DMatrix::from_fn(f, n, |i, j| functions[(i, j)] * weights[j]) * &transposed;
-        let xx = weighed(&weights[0]);
-        // Corners that count alike have the same weight along both axes, and none between them.
-        let (xy, yy) = if matches!(seen.whitener, Whitener::Alike) {
-            (DMatrix::zeros(f, f), xx.clone())
-        } else {
-            (weighed(&weights[1]), weighed(&weights[2]))
-        };
-        let mut own = DMatrix::zeros(2 * f, 2 * f);
-        own.view_mut((0, 0), (f, f)).copy_from(&xx);
-        own.view_mut((0, f), (f, f)).copy_from(&xy);
-        own.view_mut((f, 0), (f, f)).copy_from(&xy);
-        own.view_mut((f, f), (f, f)).copy_from(&yy);
-        let mut by = DMatrix::zeros(columns, 2 * f);
-        for (half, others) in others.iter().enumerate() {
-            by.columns_mut(half * f, f).copy_from(&(others * &transposed));
-        }
-        Some(Self::of(&by, own))
-    }
-
-    /// A corner turns with its own point alone.
-    fn of_print(seen: &ViewInput<'_>, rows: &Rows<'_>) -> Option<Self> {
-        let n = seen.board.len();
-        let columns = POSE + rows.count + 1;
-        let mut own = DMatrix::zeros(2 * n, 2 * n);
-        let mut by = DMatrix::zeros(columns, 2 * n);
-        let mut row = [Pair::default(); POSE + MAX_FORM + 1];
-        for (i, corner) in seen.corners.iter().enumerate() {
-            rows.fill(i, corner, &mut row).ok()?;
-            let by_point = [row[0], row[1]].map(|column| by_point(column, seen));
-            let product = |a: &Pair, b: &Pair| a[0] * b[0] + a[1] * b[1];
-            let at = [corner.index, n + corner.index];
-            for (&k, column) in at.iter().zip(&by_point) {
-                for (&l, other) in at.iter().zip(&by_point) {
-                    own[(k, l)] += product(column, other);
-                }
-                for (j, other) in row[..columns].iter().enumerate() {
-                    by[(j, k)] += product(column, other);
-                }
-            }
-        }
-        Some(Self::of(&by, own))
-    }
-
-    /// From the products with the columns of the pose, those of the form and the residual, one under the other.
-    fn of(by: &DMatrix<f64>, own: DMatrix<f64>) -> Self {
+        let (by, own) = match (effects, &whitener) {
+            (_, Whitener::Together { .. }) => of_all_rows(&seen, &rows, effects),
+            ([Effect::Distortion(degree)], _) => of_distortion(&seen, &rows, *degree),
+            ([Effect::Print], _) => of_print(&seen, &rows),
+            ([Effect::Print, Effect::Distortion(degree)], _) => of_print_and_distortion(&seen, &rows, *degree),
+            _ => of_all_rows(&seen, &rows, effects),
+        }?;
         let last = by.nrows() - 1;
-        Self {
+        Some(Self {
             by_pose: by.fixed_rows::<POSE>(0).into_owned(),
             by_form: by.rows(POSE, last - POSE).into_owned(),
             by_residual: by.row(last).transpose(),
             own,
+        })
+    }
+}
+
+/// Inner products of the columns of coefficients with those of the pose, those of the form and the residual, and with each other.
+type OfColumns = (DMatrix<f64>, DMatrix<f64>);
+
+/// Of several effects, one behind the other: every column takes up all rows.
+fn of_all_rows(seen: &ViewInput<'_>, rows: &Rows<'_>, effects: &[Effect]) -> Option<OfColumns> {
+    let size = (seen.intrinsics.width, seen.intrinsics.height);
+    let points = seen.board.len();
+    let count_of = |effect: &Effect| match effect {
+        Effect::Distortion(degree) => 2 * functions(*degree),
+        Effect::Print => 2 * points,
+    };
+    let count = effects.iter().map(count_of).sum();
+    let fill = |corner: &Corner, row: &[Pair], columns: &mut [Pair]| {
+        let mut from = 0;
+        for effect in effects {
+            let columns = &mut columns[from..from + count_of(effect)];
+            from += columns.len();
+            match effect {
+                Effect::Distortion(degree) => {
+                    let half = columns.len() / 2;
+                    for (k, value) in basis(size, *degree, &corner.px).into_iter().enumerate() {
+                        columns[k] = [value, 0.0];
+                        columns[half + k] = [0.0, value];
+                    }
+                }
+                Effect::Print => {
+                    columns[corner.index] = by_point(row[0], seen);
+                    columns[points + corner.index] = by_point(row[1], seen);
+                }
+            }
+        }
+    };
+    let all = rows.all(count, fill).ok()?;
+    let columns = all.ncols() - count;
+    let effect = all.columns(columns, count);
+    Some((all.columns(0, columns).tr_mul(&effect), effect.tr_mul(&effect)))
+}
+
+fn of_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option<OfColumns> {
+    let (n, f) = (seen.corners.len(), functions(degree));
+    let columns = POSE + rows.count + 1;
+    let size = (seen.intrinsics.width, seen.intrinsics.height);
+    let mut functions = DMatrix::zeros(f, n);
+    let mut weights = [vec![1.0; n], vec![0.0; n], vec![1.0; n]];
+    let mut others: [DMatrix<f64>; 2] = std::array::from_fn(|_| DMatrix::zeros(columns, n));
+    let mut row = [Pair::default(); POSE + MAX_FORM + 1];
+    for (i, corner) in seen.corners.iter().enumerate() {
+        rows.fill(i, corner, &mut row).ok()?;
+        let basis = DVector::from_vec(basis(size, degree, &corner.px));
+        let [[a, b], [c, d]] = whitening(seen, i);
+        for (weights, weight) in weights.iter_mut().zip([a * a + c * c, a * b + c * d, b * b + d * d]) {
+            weights[i] = weight;
+        }
+        functions.set_column(i, &basis);
+        for (j, [x, y]) in row[..columns].iter().enumerate() {
+            others[0][(j, i)] = a * x + c * y;
+            others[1][(j, i)] = b * x + d * y;
         }
     }
+    let transposed = functions.transpose();
+    let weighed = |weights: &[f64]| DMatrix::from_fn(f, n, |i, j| functions[(i, j)] * weights[j]) * &transposed;
+    let xx = weighed(&weights[0]);
+    // Corners that count alike have the same weight along both axes, and none between them.
+    let (xy, yy) = if matches!(seen.whitener, Whitener::Alike) {
+        (DMatrix::zeros(f, f), xx.clone())
+    } else {
+        (weighed(&weights[1]), weighed(&weights[2]))
+    };
+    let mut own = DMatrix::zeros(2 * f, 2 * f);
+    own.view_mut((0, 0), (f, f)).copy_from(&xx);
+    own.view_mut((0, f), (f, f)).copy_from(&xy);
+    own.view_mut((f, 0), (f, f)).copy_from(&xy);
+    own.view_mut((f, f), (f, f)).copy_from(&yy);
+    let mut by = DMatrix::zeros(columns, 2 * f);
+    for (half, others) in others.iter().enumerate() {
+        by.columns_mut(half * f, f).copy_from(&(others * &transposed));
+    }
+    Some((by, own))
+}
+
+/// A corner turns with its own point alone.
+fn of_print(seen: &ViewInput<'_>, rows: &Rows<'_>) -> Option<OfColumns> {
+    let n = seen.board.len();
+    let columns = POSE + rows.count + 1;
+    let mut own = DMatrix::zeros(2 * n, 2 * n);
+    let mut by = DMatrix::zeros(columns, 2 * n);
+    let mut row = [Pair::default(); POSE + MAX_FORM + 1];
+    for (i, corner) in seen.corners.iter().enumerate() {
+        rows.fill(i, corner, &mut row).ok()?;
+        let by_point = [row[0], row[1]].map(|column| by_point(column, seen));
+        let product = |a: &Pair, b: &Pair| a[0] * b[0] + a[1] * b[1];
+        let at = [corner.index, n + corner.index];
+        for (&k, column) in at.iter().zip(&by_point) {
+            for (&l, other) in at.iter().zip(&by_point) {
+                own[(k, l)] += product(column, other);
+            }
+            for (j, other) in row[..columns].iter().enumerate() {
+                by[(j, k)] += product(column, other);
+            }
+        }
+    }
+    Some((by, own))
+}
+
+/// That of the print first.
+fn of_print_and_distortion(seen: &ViewInput<'_>, rows: &Rows<'_>, degree: usize) -> Option<OfColumns> {
+    let ((by_print, of_print), (by_distortion, of_distortion)) =
+        (of_print(seen, rows)?, of_distortion(seen, rows, degree)?);
+    let (n, f) = (seen.board.len(), functions(degree));
+    let size = (seen.intrinsics.width, seen.intrinsics.height);
+    let mut row = [Pair::default(); POSE + MAX_FORM + 1];
+    let mut own = DMatrix::zeros(2 * (n + f), 2 * (n + f));
+    for (i, corner) in seen.corners.iter().enumerate() {
+        rows.fill(i, corner, &mut row).ok()?;
+        let [[a, b], [c, d]] = whitening(seen, i);
+        let basis = basis(size, degree, &corner.px);
+        for (k, column) in [corner.index, n + corner.index].into_iter().zip(&row) {
+            let [x, y] = by_point(*column, seen);
+            for (j, value) in basis.iter().enumerate() {
+                own[(k, 2 * n + j)] += (a * x + c * y) * value;
+                own[(k, 2 * n + f + j)] += (b * x + d * y) * value;
+            }
+        }
+    }
+    own.view_mut((0, 0), of_print.shape()).copy_from(&of_print);
+    own.view_mut((2 * n, 2 * n), of_distortion.shape()).copy_from(&of_distortion);
+    own.fill_lower_triangle_with_upper_triangle();
+    let mut by = by_print.resize_horizontally(2 * (n + f), 0.0);
+    by.columns_mut(2 * n, 2 * f).copy_from(&by_distortion);
+    Some((by, own))
+}
+
+/// By which the residual of a corner that has a weight of its own counts.
+fn whitening(seen: &ViewInput<'_>, corner: usize) -> [[f64; 2]; 2] {
+    seen.whitener.of(corner).map_or([[1.0, 0.0], [0.0, 1.0]], |w| [[w.m11, w.m12], [w.m21, w.m22]])
 }
 
 /// Weighted sums over the views with the corrections of their robot poses eliminated.

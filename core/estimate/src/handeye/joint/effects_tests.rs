@@ -40,10 +40,14 @@ fn corners_that_share_nothing_count_together_as_each_for_itself() {
         let equations = [Effect::Distortion(3), Effect::Print].map(|effect| {
             Equations::new(&problem, &solution, effect, &cancel).expect("not cancelled").expect("enough residuals")
         });
-        (solution, equations)
+        let (system, state) = (solution.linearised(&problem).expect("linear"), State::of(&solution));
+        let effects = [Effect::Print, Effect::Distortion(3)];
+        let of_view = |view| score(&problem, &state, &system, &solution.noise, &effects, view).expect("a score");
+        let scores: Vec<Score> = (0..views.len()).map(of_view).collect();
+        (solution, equations, scores)
     };
-    let (each, of_each) = solved(&stated(false));
-    let (together, of_together) = solved(&stated(true));
+    let (each, of_each, scores_of_each) = solved(&stated(false));
+    let (together, of_together, scores_together) = solved(&stated(true));
     let apart = each.hand_eye.mount_from_camera().inverse() * together.hand_eye.mount_from_camera();
     assert!(apart.translation().norm() < 1e-9, "{apart:?}");
     assert!((each.noise.corner_px / together.noise.corner_px - 1.0).abs() < 1e-6);
@@ -55,5 +59,23 @@ fn corners_that_share_nothing_count_together_as_each_for_itself() {
             (&a.pull - &b.pull).amax(),
             a.pull.amax()
         );
+    }
+    for (a, b) in scores_of_each.iter().zip(&scores_together) {
+        assert!((&a.information - &b.information).amax() < 1e-5 * a.information.amax());
+        assert!((&a.gradient - &b.gradient).amax() < 1e-5 * a.gradient.amax());
+    }
+    // All views together say of the coefficients of an effect what its equations do.
+    let all = scores_of_each.iter().map(|score| score.information.clone()).reduce(|a, b| a + b).expect("views");
+    let [distortion, print] = of_each.map(|equations| equations.information);
+    let shared = all.nrows() - print.nrows() - distortion.nrows();
+    for (at, equations) in [(shared, print), (shared + 2 * session.board.len(), distortion)] {
+        let count = equations.nrows();
+        let [of_shared, cross, own] = [(0, shared, 0, shared), (0, shared, at, count), (at, count, at, count)]
+            .map(|(row, rows, column, columns)| all.view((row, column), (rows, columns)).into_owned());
+        let scale = of_shared.diagonal().map(|value| value.sqrt().recip());
+        let scaled = DMatrix::from_fn(shared, shared, |i, j| of_shared[(i, j)] * scale[i] * scale[j]);
+        let cross = DMatrix::from_fn(shared, count, |i, j| cross[(i, j)] * scale[i]);
+        let eliminated = own - cross.tr_mul(&scaled.cholesky().expect("determined").solve(&cross));
+        assert!((&eliminated - &equations).amax() < 1e-6 * equations.amax());
     }
 }

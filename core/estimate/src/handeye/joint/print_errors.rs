@@ -101,6 +101,18 @@ impl PrintErrors {
         drawn.displaced(&self.errors_m)
     }
 
+    /// What is known of the errors before any view, as an information matrix in the order of the points along x and then along y: their
+    /// most likely kinds, of the size that they were found to have. `board` has the errors.
+    pub fn prior_information(&self, board: &BoardPoints) -> Option<DMatrix<f64>> {
+        let back: Vec<Vector2<f64>> = self.errors_m.iter().map(|error| -error).collect();
+        let kinds = Kinds::of(board.displaced(&back).drawn(), &self.shares);
+        let covariances = kinds.roots.iter().map(|(_, root)| root * root.transpose());
+        let mean = covariances.reduce(|a, b| a + b)? / kinds.roots.len() as f64;
+        let unknown: f64 =
+            self.sigma_m.iter().map(|sigma| sigma * sigma).sum::<f64>() / self.sigma_m.len().max(1) as f64;
+        covariance_of(&(mean * (self.rms_m().powi(2) + unknown)))
+    }
+
     fn coefficients(&self) -> DVector<f64> {
         let axis = |k: usize| self.errors_m.iter().map(move |error| error[k]);
         DVector::from_iterator(2 * self.errors_m.len(), axis(0).chain(axis(1)))
@@ -203,22 +215,24 @@ fn at_end(
     Ok(Some((equations, posterior)))
 }
 
-/// A solution with print errors in its target, with their uncertainty in its covariance; `problem` has that target.
+/// A solution with print errors in its target, with their uncertainty in its covariance, and the standard
+/// deviations of the errors; `problem` has that target.
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
 pub fn with_its_error(
     problem: &JointProblem<'_>,
     mut solution: JointSolution,
-    shown: &mut PrintErrors,
+    shown: &PrintErrors,
     cancel: &CancelToken,
-) -> Result<JointSolution, HandEyeError> {
-    let Some((equations, posterior)) = at_end(problem, &solution, shown, cancel)? else { return Ok(solution) };
+) -> Result<(JointSolution, Vec<f64>), HandEyeError> {
+    let Some((equations, posterior)) = at_end(problem, &solution, shown, cancel)? else {
+        return Ok((solution, shown.sigma_m.clone()));
+    };
     let follow = &equations.follow;
     solution.noise.corner_px /= shown.used_up.sqrt();
     solution.covariance = &solution.covariance / shown.used_up + follow * &posterior.covariance * follow.transpose();
-    shown.sigma_m = posterior.sigma_m();
-    Ok(solution)
+    Ok((solution, posterior.sigma_m()))
 }
 
 /// Roots of the covariances `K`: `K = B Bᵀ`.

@@ -70,7 +70,8 @@ fn solved(session: &Session) -> (Option<PrintErrors>, JointSolution, JointSoluti
     let board = print.on(problem.board);
     let problem = JointProblem { board: &board, ..problem };
     let solution = with_stated_error(&problem, solution, &cancel).expect("solves");
-    let solution = with_its_error(&problem, solution, &mut print, &cancel).expect("solves");
+    let (solution, sigma_m) = with_its_error(&problem, solution, &print, &cancel).expect("solves");
+    print.sigma_m = sigma_m;
     (Some(print), solution, plain)
 }
 

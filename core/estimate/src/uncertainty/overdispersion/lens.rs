@@ -5,6 +5,9 @@
 //! everywhere) make it look several times surer than it is, most where views are little tilted or cover a part of the image,
 //! because the lens then rests on small differences. The views themselves are independent, so the squares of their pulls on fx,
 //! fy, cx and cy are variance shown, as for a camera without a robot.
+//!
+//! Print errors and residual distortion are unknowns beside the lens here: what they take up of a few views' own errors pulls
+//! no more, and is not expected to.
 
 use std::ops::Range;
 
@@ -13,9 +16,12 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::{Check, Evidence};
 use crate::handeye::HandEyeError;
+use crate::handeye::joint::effects::score;
+use crate::handeye::joint::normal::covariance_of;
+use crate::handeye::joint::state::State;
 use crate::handeye::joint::view_block::Layout;
-use crate::handeye::joint::{JointProblem, JointSolution};
-use crate::intrinsics::evidence::{Score, scatter};
+use crate::handeye::joint::{JointProblem, JointSolution, ShownEffects};
+use crate::intrinsics::evidence::scatter;
 use handeye_geometry::progress::Work;
 
 /// fx, fy, cx and cy.
@@ -25,27 +31,40 @@ const PINHOLE: usize = 4;
 pub fn check(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
+    shown: ShownEffects<'_>,
     work: &Work<'_>,
 ) -> Result<Option<Check>, HandEyeError> {
     if !solution.free.intrinsics {
         return Ok(None);
     }
-    let system = solution.linearised(problem)?;
-    let covariance = system.reduce(&solution.noise)?.inverse();
-    let mut scores = Vec::with_capacity(system.blocks.len());
-    for (block, correction) in system.blocks.iter().zip(&system.corrections) {
+    let (system, state) = (solution.linearised(problem)?, State::of(solution));
+    let Some((effects, prior)) = shown.beforehand(problem.board) else { return Ok(None) };
+    let n = system.layout.count();
+    let count = n + prior.nrows();
+    let mut information = DMatrix::zeros(count, count);
+    information.view_mut((0, 0), (n, n)).copy_from(&system.prior_information(&solution.noise));
+    information.view_mut((n, n), prior.shape()).copy_from(&prior);
+    // With the effects that of a view is large, and not kept.
+    let of_view = |view: usize| score(problem, &state, &system, &solution.noise, &effects, view);
+    let views = 0..system.blocks.len();
+    for view in views.clone() {
         if work.is_cancelled() {
             return Err(HandEyeError::Cancelled);
         }
-        let Some((information, gradient)) = block.information(&solution.noise, correction) else { return Ok(None) };
-        scores.push(Score { information, gradient });
+        let Some(score) = of_view(view) else { return Ok(None) };
+        information += score.information;
     }
+    let Some(covariance) = covariance_of(&information) else { return Ok(None) };
     // At the optimum nothing is left to go.
-    let step = DVector::zeros(covariance.nrows());
-    let found = scatter(&scores, &covariance, &step, (Layout::FORM_AT, PINHOLE));
+    let step = DVector::zeros(count);
+    let scores = views.clone().map_while(|view| of_view(view).filter(|_| !work.is_cancelled()));
+    let found = scatter(scores, &covariance, &step, (Layout::FORM_AT, PINHOLE));
+    if work.is_cancelled() {
+        return Err(HandEyeError::Cancelled);
+    }
     Ok(found.map(|found| {
         // As for the answer itself: the noise levels come from six numbers per view less the twelve of the two poses.
-        let of_noise = 6.0 * scores.len() as f64 - 12.0;
+        let of_noise = 6.0 * views.len() as f64 - 12.0;
         let law = FisherSnedecor::new(found.degrees_of_freedom, of_noise);
         Check { by: Evidence::Lens, ratio: found.ratio, p_value: law.map_or(f64::NAN, |law| law.sf(found.ratio)) }
     }))

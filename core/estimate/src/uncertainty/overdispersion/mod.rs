@@ -15,7 +15,7 @@
 //!
 //! The covariance is multiplied by the largest ratio among those that chance explains in fewer than one case in a
 //! hundred, and by nothing if there is none. What views say of the lens widens the lens alone, and the rest as far as it rests
-//! on the lens ([`of_lens`]). All of it is done on the equations linearised at the solution: leaving a
+//! on the lens ([`of_lens`]), whenever it is more than one: few views refute nothing, and corners that err alike are the rule. All of it is done on the equations linearised at the solution: leaving a
 //! view out takes a product of small matrices, not another fit.
 //!
 //! [`PoseDependentError`]: crate::handeye::joint::PoseDependentError
@@ -36,7 +36,7 @@ pub use lens::of_lens;
 use serde::{Deserialize, Serialize};
 
 use crate::handeye::HandEyeError;
-use crate::handeye::joint::{JointProblem, JointSolution};
+use crate::handeye::joint::{JointProblem, JointSolution, ShownEffects};
 use handeye_geometry::progress::Work;
 use handeye_wording::Text;
 use handeye_wording::text;
@@ -112,8 +112,8 @@ pub struct Overdispersion {
 /// Views from which on checks are made: with fewer no order of them is rarer than one in a hundred.
 pub const NEED: usize = 6;
 
-/// Probability below which the covariance counts as refuted. There are three checks, and one of an estimated lens, so four healthy
-/// sessions in a hundred are widened without need at the most, which costs the others nothing.
+/// Probability below which the covariance counts as refuted. There are three checks, so three healthy sessions in a hundred are
+/// widened without need at the most, which costs the others nothing.
 const SIGNIFICANT: f64 = 0.01;
 
 /// Checks the covariance of a solution against its own data. The cost is linear in the number of views.
@@ -123,6 +123,7 @@ const SIGNIFICANT: f64 = 0.01;
 pub fn check<'a>(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
+    shown: ShownEffects<'_>,
     work: impl Into<Work<'a>>,
 ) -> Result<Overdispersion, HandEyeError> {
     let work = work.into();
@@ -132,13 +133,13 @@ pub fn check<'a>(
     let views = linear::views(problem, solution, &work)?;
     let mut checks =
         vec![jackknife::check(&views), neighbours::check(&views), cross_validation::check(problem, solution, &work)?];
-    checks.extend(lens::check(problem, solution, &work)?);
+    checks.extend(lens::check(problem, solution, shown, &work)?);
     checks.retain(|check| check.ratio.is_finite() && check.p_value.is_finite());
-    let (of_lens, of_all): (Vec<&Check>, Vec<&Check>) =
-        checks.iter().filter(|c| c.is_significant()).partition(|c| c.by == Evidence::Lens);
-    let largest = of_all.into_iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    let (of_lens, of_all): (Vec<&Check>, Vec<&Check>) = checks.iter().partition(|c| c.by == Evidence::Lens);
+    let refuting = of_all.into_iter().filter(|c| c.is_significant());
+    let largest = refuting.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
     let (factor, by) = (largest.map_or(1.0, |c| c.ratio), largest.map(|c| c.by));
-    let lens = of_lens.first().map_or(1.0, |c| c.ratio);
+    let lens = of_lens.first().map_or(1.0, |c| c.ratio.max(1.0));
     Ok(Overdispersion { factor, by, lens, checks })
 }
 

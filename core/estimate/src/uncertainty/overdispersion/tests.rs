@@ -23,7 +23,7 @@ fn bend(t: &mut Session, per_metre: f64) {
 fn solve(t: &Session, free: bool) -> (JointSolution, Overdispersion) {
     let problem = t.problem(free, None);
     let solution = estimate(&problem, &t.start(), &CancelToken::default()).expect("solves");
-    let widening = check(&problem, &solution, &CancelToken::default()).expect("checks");
+    let widening = check(&problem, &solution, ShownEffects::default(), &CancelToken::default()).expect("checks");
     (solution, widening)
 }
 
