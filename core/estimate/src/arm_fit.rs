@@ -42,6 +42,9 @@ pub struct ArmFit {
     /// chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected poses,
     /// which the uncertainty of the errors says.
     pub contradicted: bool,
+    /// Where the hand-eye transform would be if the target were of the stated size after all; `None` where the size is that, and where
+    /// another one is certain.
+    pub with_stated_size: Option<Alternative>,
 }
 
 /// What was estimated beside the errors of an arm and both links.
@@ -60,6 +63,11 @@ pub struct BesideArm {
 /// Gain of minus twice the log-likelihood, integrated over what is known of sizes beforehand, from which the size of the target is free:
 /// by chance one session in a hundred, of a target that is as stated (chi-square with one degree of freedom).
 const SIZE_GAIN: f64 = 6.63;
+
+/// Standard deviations by which a size has to be off for nothing else to be taken for it: one in a thousand is off by 3.3, and what is in
+/// no model has made standard deviations three times too small in recorded sessions. Poses that are read while the arm moves from view to
+/// view look like a smaller target by four.
+const CERTAIN: f64 = 10.0;
 
 impl ArmFit {
     /// Covariance of the errors, in the order of [`ArmErrors::numbers`].
@@ -126,9 +134,9 @@ impl ArmFit {
 /// view tells from such a target: a size that is off by less than prints may be is left as stated.
 fn with_shown_size<'a>(
     stated: &JointProblem<'a>,
-    fit: JointSolution,
+    fit: &JointSolution,
     work: &Work<'_>,
-) -> Result<(JointProblem<'a>, JointSolution), HandEyeError> {
+) -> Result<Option<(JointProblem<'a>, JointSolution)>, HandEyeError> {
     let sized = JointProblem { free: Free { scale: true, ..stated.free }, ..*stated };
     let by_size = if stated.free.scale { None } else { determined(joint::fit(&sized, &fit.as_start(), *work))? };
     let by_size = by_size.filter(|by_size| {
@@ -137,7 +145,15 @@ fn with_shown_size<'a>(
         let is_likelier = both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN);
         is_likelier && (by_size.shape.scale - 1.0).abs() >= LEAST_SCALE
     });
-    Ok(by_size.map_or((*stated, fit), |by_size| (sized, by_size)))
+    Ok(by_size.map(|by_size| (sized, by_size)))
+}
+
+/// The hand-eye transform with the target of the stated size, seen from that of the size that was found.
+fn with_stated_size(sized: &JointSolution, stated: &JointSolution) -> Option<Alternative> {
+    let off = (sized.shape.scale - 1.0).abs();
+    let from = sized.hand_eye.mount_from_camera().inverse() * stated.hand_eye.mount_from_camera();
+    sized.scale_sigma().filter(|sigma| off < CERTAIN * sigma)?;
+    Some(Alternative { shift: se3::log(&from.isometry()), covariance: stated.hand_eye_covariance() })
 }
 
 /// How many times as large as is expected the RMS of the residuals of so many views is by chance, once in twenty: what a pose is off has
@@ -160,7 +176,10 @@ pub(crate) fn arm_fit(
         return Ok(None);
     }
     let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
-    let (with, fit) = with_shown_size(&with, fit, work)?;
+    let (with, fit, stated) = match with_shown_size(&with, &fit, work)? {
+        Some((sized, by_size)) => (sized, by_size, Some(fit)),
+        None => (with, fit, None),
+    };
     let (with, fit) = match with_shown_field(&with, with.views, &fit, *work)? {
         Some(with_field) => (JointProblem { free: with_field.free, ..with }, with_field),
         None => (with, fit),
@@ -183,6 +202,7 @@ pub(crate) fn arm_fit(
     };
     let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, depth: fit.depth, free: fit.free };
     Ok(Some(ArmFit {
+        with_stated_size: stated.and_then(|stated| with_stated_size(&fit, &stated)),
         errors,
         hand_eye: fit.hand_eye,
         beside,

@@ -8,9 +8,10 @@ use crate::diagnose::findings::{FindingCode, FindingOptions, Severity, findings}
 use crate::diagnose::{Calibration, calibrate};
 use crate::handeye::Mode;
 use crate::handeye::joint::camera_from_target;
+use crate::reach_error::ReachErrors;
 use crate::stated_uncertainty::StatedUncertainty;
 use crate::test_sessions::OFF_LINKS;
-use crate::{Method, fit as calibrated};
+use crate::{Fit, Method, fit as calibrated};
 
 /// RMS of the residuals of views that were not in the fit, pixels, by reported poses and by corrected ones.
 fn predicted(of: &Setup, fitted: usize) -> (ArmFit, [f64; 2]) {
@@ -144,5 +145,45 @@ fn what_the_errors_of_an_arm_explain_is_called_nothing_else_and_a_board_that_sli
         let point = calibration.joint.as_ref().expect("joint").reference_point;
         let of_arm_m = calibration.stated_uncertainty().moved_m(&point);
         assert!((1e-5..1e-3).contains(&of_arm_m), "{mode:?}: {of_arm_m}");
+    }
+}
+
+/// Whose target is larger than stated.
+fn larger(mode: Mode, by: f64, robot: [f64; 2]) -> Fit {
+    let [robot_m, robot_rad] = robot;
+    let mut setup = Setup { views: 20, ..with(mode, ArmError::None, 8) };
+    setup.noise = Noise { robot_m, robot_rad, ..setup.noise };
+    setup.fault.scale = by;
+    calibrated(&session(&setup).observations(false), Method::Joint, &CancelToken::default()).expect("solves")
+}
+
+#[test]
+fn where_another_size_is_not_certain_corrected_commands_count_what_the_stated_one_would_do() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let precise = larger(mode, 0.013, [2e-5, 1e-4]);
+        let arm = precise.arm().expect("the joints are known");
+        assert!(arm.beside.free.scale && arm.with_stated_size.is_none(), "{mode:?}: the board is another one");
+        // As poses that are read in motion scatter.
+        let scattered = larger(mode, 0.03, [1e-3, 7e-3]);
+        let arm = scattered.arm().expect("the joints are known");
+        assert!(arm.beside.free.scale, "{mode:?}: {:?}", arm.beside);
+        let stated = arm.with_stated_size.clone().expect("something else may look like it");
+        let point = scattered.joint.as_ref().expect("joint").reference_point;
+        // Some hundredths of half a metre.
+        let by_size_m = stated.moved_m(&point);
+        assert!((2e-3..3e-2).contains(&by_size_m), "{mode:?}: {by_size_m}");
+        let reach = ReachErrors {
+            as_it_is_95_m: 3e-3,
+            as_it_is_least_95_m: 1e-3,
+            corrected_95_m: Some(2e-3),
+            repeatability_95_m: 1e-3,
+        };
+        let moved = Calibration::as_modelled(scattered).moved(reach, &[point]);
+        let corrected_95_m = Some(2e-3 + by_size_m);
+        assert_eq!(
+            moved,
+            ReachErrors { corrected_95_m, ..reach },
+            "{mode:?}: commands as they are go by the stated size"
+        );
     }
 }

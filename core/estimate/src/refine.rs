@@ -256,7 +256,8 @@ fn bent(
 
 /// The print errors that the views of a screened estimate show, and the estimate with them. `problem` has the target as drawn.
 ///
-/// Where the target is bent as well, that is decided again: points that are off within the plane look like a bend.
+/// Errors that are smooth over the image are smooth over a target that is always seen alike, and the other way round. What explains
+/// more goes first: where that is the lens, the print is what its residual distortion leaves.
 fn printed(
     problem: &JointProblem<'_>,
     screened: &Screened,
@@ -264,18 +265,37 @@ fn printed(
 ) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
     let views = screened.kept_views();
     let problem = kept_problem(problem, &views, &screened.solution);
-    let shown = with_shown_print(&problem, &screened.solution, work.cancel)?;
+    let shown = printed_on(&problem, &screened.solution, work)?;
+    let Some((print, _)) = &shown else { return Ok(None) };
+    match with_shown_distortion(&problem, &screened.solution, work.cancel)? {
+        Some((distortion, solution)) if distortion.gain > print.gain => {
+            let views = corrected(&views, &distortion.field);
+            printed_on(&JointProblem { views: &views, ..problem }, &solution, work)
+        }
+        _ => Ok(shown),
+    }
+}
+
+/// The print errors that the views of a problem show beside an estimate without.
+///
+/// Where the target is bent as well, that is decided again: points that are off within the plane look like a bend.
+fn printed_on(
+    problem: &JointProblem<'_>,
+    without: &JointSolution,
+    work: &Work<'_>,
+) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
+    let shown = with_shown_print(problem, without, work.cancel)?;
     if shown.is_none() || !problem.free.warp {
         return Ok(shown);
     }
-    let flat = JointProblem { free: Free { warp: false, ..problem.free }, ..problem };
-    let start = screened.solution.as_start();
+    let flat = JointProblem { free: Free { warp: false, ..problem.free }, ..*problem };
+    let start = without.as_start();
     let start = JointStart { shape: BoardShape { warp_m: [0.0; 2], ..start.shape }, ..start };
     let Some(solution) = determined(joint::fit(&flat, &start, work.cancel))? else { return Ok(shown) };
     let Some((print, solution)) = with_shown_print(&flat, &solution, work.cancel)? else { return Ok(shown) };
     let board = print.on(problem.board);
     let with_print = JointProblem { board: &board, ..flat };
-    let is_bent = bent(&with_print, &views, &solution, Some(&print), work)?.is_some();
+    let is_bent = bent(&with_print, problem.views, &solution, Some(&print), work)?.is_some();
     Ok(if is_bent { shown } else { Some((print, solution)) })
 }
 

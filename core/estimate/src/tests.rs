@@ -1,9 +1,10 @@
 use std::cell::RefCell;
 
 use super::*;
+use crate::handeye::joint::PrintErrors;
 use handeye_geometry::camera::Distortion;
 use handeye_geometry::progress::{CancelToken, Progress};
-use handeye_simulate::session::{REALISTIC, Session, camera, trial};
+use handeye_simulate::session::{Cone, REALISTIC, Session, Setup, camera, session, trial};
 
 fn solve(observations: &Observations, method: Method) -> Fit {
     fit(observations, method, &CancelToken::default()).expect("solves")
@@ -272,4 +273,18 @@ fn the_size_of_the_target_is_found_when_it_is_asked_for() {
     let found = c.joint.expect("joint").shape.expect("estimated");
     let sigma = found.scale_sigma.expect("estimated");
     assert!((found.shape.scale - 1.02).abs() < 4.0 * sigma && sigma < 2e-3, "{found:?}");
+}
+
+/// Of a target that is always seen alike what is smooth over the image is smooth over the target, too.
+#[test]
+fn what_the_lens_does_beyond_its_model_is_not_taken_for_the_print() {
+    for (seed, amplitude_px) in (900..906).flat_map(|seed| [(seed, 0.2), (seed, 0.3)]) {
+        let cone = Cone { roll_deg: 10.0, beside_m: 0.01, ..Cone::PUBLISHED };
+        let mut truth = session(&Setup { cone, ..Setup::new(Mode::EyeInHand, 8, seed) });
+        truth.add_waves(amplitude_px, 500.0);
+        let fit = solve(&truth.observations(true), Method::Joint);
+        let joint = fit.joint.as_ref().expect("of the joint estimate");
+        assert!(joint.print.is_none(), "{seed}, {amplitude_px} px: {:?}", joint.print.as_ref().map(PrintErrors::rms_m));
+        assert!(joint.residual_distortion.is_some(), "{seed}, {amplitude_px} px");
+    }
 }

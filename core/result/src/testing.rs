@@ -189,6 +189,7 @@ pub fn golden_arm() -> (Arm, ArmFit) {
         },
         heldout_px: Some([1.0, 0.25]),
         contradicted: false,
+        with_stated_size: None,
     };
     (chain, fit)
 }

@@ -14,7 +14,7 @@
 //! | [`Evidence::Lens`] | how far single views pull an estimated lens |
 //!
 //! The covariance is multiplied by the largest ratio among those that chance explains in fewer than one case in a
-//! hundred, and by nothing if there is none. What views say of the lens widens the lens alone, and the rest as far as it rests
+//! hundred, less what the lens explains of it, and by nothing if there is none. What views say of the lens widens the lens alone, and the rest as far as it rests
 //! on the lens ([`of_lens`]), whenever it is more than one: few views refute nothing, and corners that err alike are the rule. All of it is done on the equations linearised at the solution: leaving a
 //! view out takes a product of small matrices, not another fit.
 //!
@@ -136,10 +136,12 @@ pub fn check<'a>(
     checks.extend(lens::check(problem, solution, shown, &work)?);
     checks.retain(|check| check.ratio.is_finite() && check.p_value.is_finite());
     let (of_lens, of_all): (Vec<&Check>, Vec<&Check>) = checks.iter().partition(|c| c.by == Evidence::Lens);
-    let refuting = of_all.into_iter().filter(|c| c.is_significant());
-    let largest = refuting.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    let (factor, by) = (largest.map_or(1.0, |c| c.ratio), largest.map(|c| c.by));
     let lens = of_lens.first().map_or(1.0, |c| c.ratio.max(1.0));
+    // What views do to the lens they do to the answer, and it is counted once.
+    let counted = solution.widened_by_lens(lens);
+    let refuting = of_all.into_iter().filter(|c| c.is_significant() && c.ratio > counted);
+    let largest = refuting.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    let (factor, by) = (largest.map_or(1.0, |c| c.ratio / counted), largest.map(|c| c.by));
     Ok(Overdispersion { factor, by, lens, checks })
 }
 
