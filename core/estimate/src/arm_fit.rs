@@ -11,7 +11,7 @@ use crate::handeye::{HandEye, HandEyeError, determined};
 use crate::resolution;
 use crate::size::LEAST_SCALE;
 use crate::stated_uncertainty::Alternative;
-use crate::uncertainty::overdispersion;
+use crate::uncertainty::overdispersion::{self, Overdispersion};
 use crate::uncertainty::quality::{self, PredictedBy};
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::progress::Work;
@@ -35,6 +35,8 @@ pub struct ArmFit {
     pub small_sample: SmallSample,
     /// Noise levels, those of the arm's errors among them; what of the robot remains is what its links do not explain.
     pub noise: Noise,
+    /// By how much the covariance was widened, because the data scatter more than the noise levels say.
+    pub widening: Overdispersion,
     /// RMS of 2-D corner residuals on views left out \[px\], by reported poses as they are and by corrected ones; `None` with too few
     /// views.
     pub heldout_px: Option<[f64; 2]>,
@@ -42,9 +44,6 @@ pub struct ArmFit {
     /// chance, and worse than the model of the arm itself explains. An exact arm is predicted a little worse by its corrected poses,
     /// which the uncertainty of the errors says.
     pub contradicted: bool,
-    /// Where the hand-eye transform would be if the target were of the stated size after all; `None` where the size is that, and where
-    /// another one is certain.
-    pub with_stated_size: Option<Alternative>,
 }
 
 /// What was estimated beside the errors of an arm and both links.
@@ -66,7 +65,7 @@ const SIZE_GAIN: f64 = 6.63;
 
 /// Standard deviations by which a size has to be off for nothing else to be taken for it: one in a thousand is off by 3.3, and what is in
 /// no model has made standard deviations three times too small in recorded sessions. Poses that are read while the arm moves from view to
-/// view look like a smaller target by four.
+/// view look like a target that is smaller by four of them.
 const CERTAIN: f64 = 10.0;
 
 impl ArmFit {
@@ -134,9 +133,9 @@ impl ArmFit {
 /// view tells from such a target: a size that is off by less than prints may be is left as stated.
 fn with_shown_size<'a>(
     stated: &JointProblem<'a>,
-    fit: &JointSolution,
+    fit: JointSolution,
     work: &Work<'_>,
-) -> Result<Option<(JointProblem<'a>, JointSolution)>, HandEyeError> {
+) -> Result<(JointProblem<'a>, JointSolution), HandEyeError> {
     let sized = JointProblem { free: Free { scale: true, ..stated.free }, ..*stated };
     let by_size = if stated.free.scale { None } else { determined(joint::fit(&sized, &fit.as_start(), *work))? };
     let by_size = by_size.filter(|by_size| {
@@ -145,15 +144,16 @@ fn with_shown_size<'a>(
         let is_likelier = both.is_some_and(|(sized, stated)| stated - (sized + 2.0 * SIZE_SIGMA.ln()) > SIZE_GAIN);
         is_likelier && (by_size.shape.scale - 1.0).abs() >= LEAST_SCALE
     });
-    Ok(by_size.map(|by_size| (sized, by_size)))
+    Ok(by_size.map_or((*stated, fit), |by_size| (sized, by_size)))
 }
 
-/// The hand-eye transform with the target of the stated size, seen from that of the size that was found.
-fn with_stated_size(sized: &JointSolution, stated: &JointSolution) -> Option<Alternative> {
-    let off = (sized.shape.scale - 1.0).abs();
-    let from = sized.hand_eye.mount_from_camera().inverse() * stated.hand_eye.mount_from_camera();
-    sized.scale_sigma().filter(|sigma| off < CERTAIN * sigma)?;
-    Some(Alternative { shift: se3::log(&from.isometry()), covariance: stated.hand_eye_covariance() })
+/// The covariance where the size that was found is not certain: it and the stated one are as likely, and half the square of their
+/// difference is added to its variance, with what rests on it.
+fn with_uncertain_size(fit: &JointSolution) -> Option<DMatrix<f64>> {
+    let sigma = fit.scale_sigma()?;
+    let off = (fit.shape.scale - 1.0).abs() / sigma;
+    let at = 12 + fit.free.form().scale_at(&fit.intrinsics);
+    (off < CERTAIN).then(|| overdispersion::with_less_known(&fit.covariance, at..at + 1, 1.0 + 0.5 * off * off))
 }
 
 /// How many times as large as is expected the RMS of the residuals of so many views is by chance, once in twenty: what a pose is off has
@@ -176,18 +176,16 @@ pub(crate) fn arm_fit(
         return Ok(None);
     }
     let Some(fit) = determined(joint::fit(&with, &solution.as_start(), *work))? else { return Ok(None) };
-    let (with, fit, stated) = match with_shown_size(&with, &fit, work)? {
-        Some((sized, by_size)) => (sized, by_size, Some(fit)),
-        None => (with, fit, None),
-    };
+    // A size that is asked for is not the one that was stated.
+    let is_asked = with.free.scale;
+    let (with, fit) = with_shown_size(&with, fit, work)?;
     let (with, fit) = match with_shown_field(&with, with.views, &fit, *work)? {
         Some(with_field) => (JointProblem { free: with_field.free, ..with }, with_field),
         None => (with, fit),
     };
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
+    // Of several sessions with one lens what that does beyond its model is as uncertain here as by the views of this one.
     let (mut fit, _) = shown.with_their_error(&with, fit, work.cancel)?;
-    // What views disagree about does not count less where the joints are known.
-    fit.widen(&overdispersion::check(&with, &fit, shown, work.cancel)?);
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
     let heldout = quality::compared((problem, solution), (&with, &fit), PredictedBy::Links, work.cancel)?;
     let contradicted = match heldout.filter(|heldout| heldout.is_worse) {
@@ -200,15 +198,21 @@ pub(crate) fn arm_fit(
             })
         }
     };
+    // Views left out are judged by the model as it is, and what they disagree about counts after that.
+    let widening = overdispersion::check(&with, &fit, shown, work.cancel)?;
+    fit.widen(&widening);
+    if let Some(covariance) = with_uncertain_size(&fit).filter(|_| !is_asked) {
+        fit.covariance = covariance;
+    }
     let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, depth: fit.depth, free: fit.free };
     Ok(Some(ArmFit {
-        with_stated_size: stated.and_then(|stated| with_stated_size(&fit, &stated)),
         errors,
         hand_eye: fit.hand_eye,
         beside,
         covariance: fit.covariance,
         small_sample: fit.small_sample,
         noise: fit.noise,
+        widening,
         heldout_px: heldout.map(|heldout| [heldout.before_px, heldout.after_px]),
         contradicted,
     }))

@@ -10,7 +10,7 @@ use crate::handeye::consensus::{Consensus, consensus};
 use crate::handeye::joint::outliers::{Screened, estimate_screened};
 use crate::handeye::joint::prediction::ErrorCurve;
 use crate::handeye::joint::print_errors::{self, with_shown_print};
-use crate::handeye::joint::residual_distortion::{corrected, with_shown_distortion};
+use crate::handeye::joint::residual_distortion::{self, corrected, with_shown_distortion};
 use crate::handeye::joint::with_depths::{OtherModel, with_depths};
 use crate::handeye::joint::{
     self, CornerWeights, DepthWeight, Free, JointProblem, JointSolution, JointStart, PrintErrors, ShownDistortion,
@@ -263,29 +263,37 @@ fn printed(
     screened: &Screened,
     work: &Work<'_>,
 ) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
-    let views = screened.kept_views();
-    let problem = kept_problem(problem, &views, &screened.solution);
-    let shown = printed_on(&problem, &screened.solution, work)?;
-    let Some((print, _)) = &shown else { return Ok(None) };
-    match with_shown_distortion(&problem, &screened.solution, work.cancel)? {
-        Some((distortion, solution)) if distortion.gain > print.gain => {
-            let views = corrected(&views, &distortion.field);
-            printed_on(&JointProblem { views: &views, ..problem }, &solution, work)
-        }
-        _ => Ok(shown),
-    }
+    let (views, without) = (screened.kept_views(), &screened.solution);
+    let problem = kept_problem(problem, &views, without);
+    let Some(shown) = with_shown_print(&problem, without, work.cancel)? else { return Ok(None) };
+    let distorted = if residual_distortion::gain(&problem, without, work.cancel)? > shown.0.gain {
+        with_shown_distortion(&problem, without, work.cancel)?
+    } else {
+        None
+    };
+    let Some((distortion, distorted)) = distorted else {
+        return on_flat_target(&problem, without, shown, work).map(Some);
+    };
+    let undistorted = corrected(&views, &distortion.field);
+    let of_undistorted = JointProblem { views: &undistorted, ..problem };
+    let Some(shown) = with_shown_print(&of_undistorted, &distorted, work.cancel)? else { return Ok(None) };
+    let (print, solution) = on_flat_target(&of_undistorted, &distorted, shown, work)?;
+    // The distortion is found again once all else is; until then the corners are as they were measured.
+    let board = print.on(problem.board);
+    let with_print = JointProblem { board: &board, free: solution.free, ..problem };
+    let solution = determined(joint::fit(&with_print, &solution.as_start(), work.cancel))?;
+    Ok(solution.map(|solution| (print, solution)))
 }
 
-/// The print errors that the views of a problem show beside an estimate without.
-///
-/// Where the target is bent as well, that is decided again: points that are off within the plane look like a bend.
-fn printed_on(
+/// Print errors that were shown beside an estimate without, decided again where the target is bent as well: points that are off within
+/// the plane look like a bend.
+fn on_flat_target(
     problem: &JointProblem<'_>,
     without: &JointSolution,
+    shown: (PrintErrors, JointSolution),
     work: &Work<'_>,
-) -> Result<Option<(PrintErrors, JointSolution)>, HandEyeError> {
-    let shown = with_shown_print(problem, without, work.cancel)?;
-    if shown.is_none() || !problem.free.warp {
+) -> Result<(PrintErrors, JointSolution), HandEyeError> {
+    if !problem.free.warp {
         return Ok(shown);
     }
     let flat = JointProblem { free: Free { warp: false, ..problem.free }, ..*problem };
@@ -296,7 +304,7 @@ fn printed_on(
     let board = print.on(problem.board);
     let with_print = JointProblem { board: &board, ..flat };
     let is_bent = bent(&with_print, problem.views, &solution, Some(&print), work)?.is_some();
-    Ok(if is_bent { shown } else { Some((print, solution)) })
+    Ok(if is_bent { shown } else { (print, solution) })
 }
 
 /// Tries the depths of the views, and takes them unless they make predictions of held-out views worse by more than chance. That

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix6};
 use serde::{Deserialize, Serialize};
 
 use super::check::{BadResult, Checked, all_finite, not_negative, require};
-use super::{BoardEstimate, IntrinsicsEstimate, PoseDependentErrorEstimate, TransformEstimate};
+use super::{BoardEstimate, IntrinsicsEstimate, OverdispersionRecord, PoseDependentErrorEstimate, TransformEstimate};
 use handeye_arm::Arm;
 use handeye_estimate::ArmFit;
 use handeye_estimate::corrected_arm::CorrectedArm;
@@ -44,6 +44,9 @@ pub struct ArmEstimate {
     /// (x, y), then all `compliance`; what is null in `joints` is left out. Where there is a `field`, then its slopes by columns: all of
     /// the position (tip, base), then all of the orientation.
     pub covariance: Vec<Vec<f64>>,
+    /// By how much the covariances were widened, as in [`EstimateDetails`](super::EstimateDetails); `None` where they were not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub widening: Option<OverdispersionRecord>,
     /// As in [`EstimateDetails`](super::EstimateDetails).
     pub degrees_of_freedom: Option<f64>,
     /// Likewise.
@@ -195,6 +198,8 @@ impl ArmEstimate {
             board: fit.shape().map(BoardEstimate::from),
             field: fit.errors.field().map(|it| PoseDependentErrorEstimate::new(it, &fit.noise, None)),
             covariance: of_errors.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            widening: Some(OverdispersionRecord::from(&fit.widening))
+                .filter(|widening| widening.factor > 1.0 || widening.lens_factor.is_some()),
             degrees_of_freedom: Some(fit.small_sample.degrees_of_freedom).filter(|value| value.is_finite()),
             region_scale: fit.small_sample.scale,
             heldout_px: fit.heldout_px.map(|[reported, corrected]| HeldOutByArm { reported, corrected }),
@@ -242,6 +247,7 @@ impl ArmEstimate {
         }
         self.field.as_ref().map_or(Ok(()), |field| field.check("arm.field"))?;
         let count = parameters.len() + self.field.as_ref().map_or(0, |field| field.field().slopes().len());
+        self.widening.as_ref().map_or(Ok(()), |widening| widening.check("arm.widening"))?;
         let is_square = self.covariance.iter().all(|row| row.len() == count);
         require(self.covariance.len() == count && is_square, "arm.covariance", "is of another arm")?;
         for row in &self.covariance {

@@ -154,11 +154,7 @@ fn check_estimate(estimate: &EstimateDetails) -> Checked {
     not_negative(estimate.region_scale, "estimate.region_scale")?;
     not_negative(estimate.view_sigma_px, "estimate.view_sigma_px")?;
     estimate.reference_point_m.map_or(Ok(()), |p| all_finite(&p, "estimate.reference_point_m"))?;
-    if let Some(widening) = &estimate.widening {
-        require(widening.factor >= 1.0, "estimate.widening.factor", "must be at least 1")?;
-        let of_lens = widening.lens_factor.is_none_or(|factor| factor >= 1.0);
-        require(of_lens, "estimate.widening.lens_factor", "must be at least 1")?;
-    }
+    estimate.widening.as_ref().map_or(Ok(()), |widening| widening.check("estimate.widening"))?;
     if let Some(board) = &estimate.board {
         board.check("estimate.board")?;
     }

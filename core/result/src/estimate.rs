@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::check::{Checked, all_finite, require};
 use handeye_estimate::diagnose::record::FindingRecord;
 use handeye_estimate::handeye::joint::{Noise, PoseDependentError, Slopes};
+use handeye_estimate::uncertainty::overdispersion::Overdispersion;
 
 /// Details of a joint estimate. Of a camera alone there are the target as found, and degrees of freedom and widening of the
 /// standard deviations of its intrinsics.
@@ -59,6 +60,24 @@ pub struct OverdispersionRecord {
     /// By how much standard deviations of an estimated lens were widened besides, above 1, as far as the views disagree about it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_factor: Option<f64>,
+}
+
+impl OverdispersionRecord {
+    pub(crate) fn check(&self, at: &str) -> Checked {
+        require(self.factor >= 1.0, format!("{at}.factor"), "must be at least 1")?;
+        let of_lens = self.lens_factor.is_none_or(|factor| factor >= 1.0);
+        require(of_lens, format!("{at}.lens_factor"), "must be at least 1")
+    }
+}
+
+impl From<&Overdispersion> for OverdispersionRecord {
+    fn from(widening: &Overdispersion) -> Self {
+        Self {
+            factor: widening.factor.sqrt(),
+            by: widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
+            lens_factor: Some(widening.lens.sqrt()).filter(|factor| *factor > 1.0),
+        }
+    }
 }
 
 /// The size of the target by the robot's motion.

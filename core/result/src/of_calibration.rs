@@ -97,11 +97,7 @@ fn details(calibration: &Calibration, joint: &JointFit) -> EstimateDetails {
         degrees_of_freedom: Some(joint.small_sample.degrees_of_freedom).filter(|v| v.is_finite()),
         region_scale: Some(joint.small_sample.scale),
         view_sigma_px: Some(joint.noise.view_px),
-        widening: Some(OverdispersionRecord {
-            factor: joint.widening.factor.sqrt(),
-            by: joint.widening.by.map_or_else(|| "none".to_owned(), |by| by.name().to_owned()),
-            lens_factor: Some(joint.widening.lens.sqrt()).filter(|factor| *factor > 1.0),
-        }),
+        widening: Some(OverdispersionRecord::from(&joint.widening)),
         board: joint.shape.map(BoardEstimate::from),
         target_size: joint.size.as_ref().map(|size| TargetSizeEstimate {
             true_over_stated: size.scale,

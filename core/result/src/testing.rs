@@ -13,6 +13,7 @@ use handeye_estimate::handeye::HandEye;
 use handeye_estimate::handeye::joint::{
     ArmErrors, Free, Noise, PoseDependentError, Slopes, SmallSample, arm_parameters,
 };
+use handeye_estimate::uncertainty::overdispersion::{Evidence, Overdispersion};
 use handeye_estimate::{ArmFit, BesideArm};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -187,9 +188,9 @@ pub fn golden_arm() -> (Arm, ArmFit) {
             compliance_rad: 3e-4,
             ..Noise::EXACT
         },
+        widening: Overdispersion { factor: 1.44, by: Some(Evidence::Neighbours), lens: 2.25, checks: Vec::new() },
         heldout_px: Some([1.0, 0.25]),
         contradicted: false,
-        with_stated_size: None,
     };
     (chain, fit)
 }

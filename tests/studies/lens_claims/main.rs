@@ -12,8 +12,7 @@ use handeye_estimate::diagnose::doctor::Diagnosis;
 use handeye_estimate::diagnose::findings::FindingCode;
 use handeye_estimate::diagnose::{Calibration, calibrate};
 use handeye_estimate::handeye::Mode;
-use handeye_estimate::uncertainty::overdispersion::{self, Check, Evidence};
-use handeye_estimate::uncertainty::quality;
+use handeye_estimate::uncertainty::{overdispersion, quality};
 use handeye_estimate::{JointFit, Method, Observations};
 use handeye_geometry::progress::CancelToken;
 use nalgebra::{DMatrix, Matrix6};
@@ -189,10 +188,9 @@ fn halves_row(scene: &Scene, what: &str, sessions: u64) {
             let off = [lens.fx - truth.fx, lens.fy - truth.fy, lens.cx - truth.cx, lens.cy - truth.cy];
             with.add(&joint.covariance, off, joint, error_m, lens.fx);
             let places = LENS_AT..LENS_AT + lens.parameter_count();
-            let before = overdispersion::of_lens(&joint.covariance, places, joint.widening.lens.recip());
+            let before = overdispersion::with_less_known(&joint.covariance, places, joint.widening.lens.recip());
             without.add(&before, off, joint, error_m, lens.fx);
-            let of_lens = joint.widening.checks.iter().find(|check| check.by == Evidence::Lens);
-            widened += usize::from(of_lens.is_some_and(Check::is_significant));
+            widened += usize::from(joint.widening.lens_is_refuted());
             true_m.push(error_m);
         }
     }

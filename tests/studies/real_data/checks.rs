@@ -32,6 +32,8 @@ pub fn run(set: &Set) {
         };
         let took = before.elapsed();
         let covariance = solution.hand_eye_covariance();
+        let mut widened = solution.clone();
+        widened.widen(&widening);
         let mm = |c| quality::tip_error_95_at(&c, solution.small_sample, &solution.reference_point) * 1e3;
         let t_mm = solution.hand_eye.mount_from_camera().translation() * 1e3;
         println!(
@@ -51,7 +53,7 @@ pub fn run(set: &Set) {
             t_mm.z,
             solution.small_sample.degrees_of_freedom,
             mm(covariance),
-            mm(covariance * widening.factor),
+            mm(widened.hand_eye_covariance()),
             widening.by,
             took.as_secs_f64() * 1e3,
         );

@@ -1,6 +1,6 @@
 //! What a calibration promises, and is asked for: how near a tool arrives where the arm is known, else how near a point is measured.
 
-use nalgebra::{DMatrix, Point3, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::Calibration;
 use crate::corrected_arm::CorrectedArm;
@@ -56,17 +56,7 @@ impl Calibration {
     pub fn reach_errors(&self) -> Option<ReachErrors> {
         self.reach.as_ref()?;
         let at = self.joint.as_ref()?.reference_point;
-        Some(self.moved(self.reach_at_target?, &[at]))
-    }
-
-    /// Reach errors with how far what was found would move the answer at the farthest of some points, and with how far the stated size of
-    /// the target would move it for corrected commands, which are by another.
-    pub(crate) fn moved(&self, reach: ReachErrors, points: &[Point3<f64>]) -> ReachErrors {
-        let farthest = |of: &dyn Fn(&Point3<f64>) -> f64| points.iter().map(of).fold(0.0, f64::max);
-        let stated_size = self.fit.arm().and_then(|arm| arm.with_stated_size.as_ref());
-        let by_size_m = stated_size.map_or(0.0, |stated| farthest(&|point| stated.moved_m(point)));
-        let moved = reach.moved_by(farthest(&|point| self.stated.moved_m(point)));
-        ReachErrors { corrected_95_m: moved.corrected_95_m.map(|corrected_m| corrected_m + by_size_m), ..moved }
+        Some(self.reach_at_target?.moved_by(self.stated.moved_m(&at)))
     }
 
     /// The error of a measured point where the camera saw the target by the poses that the robot reports, 95 %, metres: what images and
@@ -117,7 +107,8 @@ impl Calibration {
 
     fn reach_in(&self, tool_box: &TipBox) -> Option<ReachErrors> {
         let points = tool_box.corners_and_middle();
-        Some(self.moved(self.reach.as_ref()?.at_points(&points)?, &points))
+        let moved_m = points.iter().map(|point| self.stated.moved_m(point)).fold(0.0, f64::max);
+        Some(self.reach.as_ref()?.at_points(&points)?.moved_by(moved_m))
     }
 }
 

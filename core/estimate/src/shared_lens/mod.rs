@@ -261,7 +261,8 @@ fn fitted(
         factor
     } else {
         let widening = overdispersion::check(&problem, solution, refined.shown(), work.cancel)?;
-        widening.factor * widening.lens
+        // A chance of one session is none of the weights of all.
+        widening.factor * if widening.lens_is_refuted() { widening.lens } else { 1.0 }
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.
     let stated = refined.distortion.as_ref().and_then(|_| LensInformation::stated(solution));

@@ -3,7 +3,6 @@
 
 use super::{Finding, FindingCode, Severity, listed};
 use crate::diagnose::Calibration;
-use crate::uncertainty::overdispersion::Evidence;
 use crate::{JointFit, ViewResult, ViewStatus, resolution};
 use handeye_wording::text;
 use handeye_wording::{Text, shown};
@@ -154,8 +153,7 @@ fn widened(calibration: &Calibration) -> Option<Finding> {
 fn lens_widened(calibration: &Calibration) -> Option<Finding> {
     let widening = &calibration.joint.as_ref()?.widening;
     let times = widening.lens.sqrt();
-    let disagree = widening.checks.iter().any(|check| check.by == Evidence::Lens && check.is_significant());
-    if !disagree || times < WIDENING_WORTH_SAYING {
+    if !widening.lens_is_refuted() || times < WIDENING_WORTH_SAYING {
         return None;
     }
     let text = text!(

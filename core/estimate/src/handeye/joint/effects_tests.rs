@@ -66,16 +66,20 @@ fn corners_that_share_nothing_count_together_as_each_for_itself() {
     }
     // All views together say of the coefficients of an effect what its equations do.
     let all = scores_of_each.iter().map(|score| score.information.clone()).reduce(|a, b| a + b).expect("views");
-    let [distortion, print] = of_each.map(|equations| equations.information);
-    let shared = all.nrows() - print.nrows() - distortion.nrows();
+    let pull = -scores_of_each.iter().map(|score| score.gradient.clone()).reduce(|a, b| a + b).expect("views");
+    let [distortion, print] = of_each;
+    let shared = all.nrows() - print.pull.len() - distortion.pull.len();
     for (at, equations) in [(shared, print), (shared + 2 * session.board.len(), distortion)] {
-        let count = equations.nrows();
+        let count = equations.pull.len();
         let [of_shared, cross, own] = [(0, shared, 0, shared), (0, shared, at, count), (at, count, at, count)]
             .map(|(row, rows, column, columns)| all.view((row, column), (rows, columns)).into_owned());
         let scale = of_shared.diagonal().map(|value| value.sqrt().recip());
         let scaled = DMatrix::from_fn(shared, shared, |i, j| of_shared[(i, j)] * scale[i] * scale[j]);
         let cross = DMatrix::from_fn(shared, count, |i, j| cross[(i, j)] * scale[i]);
-        let eliminated = own - cross.tr_mul(&scaled.cholesky().expect("determined").solve(&cross));
-        assert!((&eliminated - &equations).amax() < 1e-6 * equations.amax());
+        let follow = scaled.cholesky().expect("determined").solve(&cross);
+        let eliminated = own - cross.tr_mul(&follow);
+        assert!((&eliminated - &equations.information).amax() < 1e-6 * equations.information.amax());
+        let eliminated = pull.rows(at, count) - follow.tr_mul(&pull.rows(0, shared).component_mul(&scale));
+        assert!((&eliminated - &equations.pull).amax() < 1e-6 * equations.pull.amax());
     }
 }

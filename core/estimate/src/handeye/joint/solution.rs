@@ -122,19 +122,10 @@ impl JointSolution {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
 
-    /// What the variances of the hand-eye transform are multiplied by, in the mean of its six directions, where those of a free lens are
-    /// by a factor.
-    pub fn widened_by_lens(&self, factor: f64) -> f64 {
-        let widened = overdispersion::of_lens(&self.covariance, self.lens_places(), factor);
-        let hand_eye: Matrix6<f64> = widened.fixed_view::<6, 6>(0, 0).into_owned();
-        let before = self.hand_eye_covariance().cholesky();
-        before.filter(|_| factor > 1.0).map_or(1.0, |before| before.solve(&hand_eye).trace() / 6.0)
-    }
-
     /// Multiplies the covariance, and that of a free lens with what rests on it, because the data show that they are too small.
     pub fn widen(&mut self, widening: &Overdispersion) {
         if widening.lens > 1.0 {
-            self.covariance = overdispersion::of_lens(&self.covariance, self.lens_places(), widening.lens);
+            self.covariance = overdispersion::with_less_known(&self.covariance, self.lens_places(), widening.lens);
         }
         self.covariance *= widening.factor;
     }

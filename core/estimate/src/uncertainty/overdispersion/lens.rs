@@ -27,13 +27,28 @@ use handeye_geometry::progress::Work;
 /// fx, fy, cx and cy.
 const PINHOLE: usize = 4;
 
-/// Sum of the squared pulls of single views on the pinhole against what the covariance makes of them; `None` for a given lens.
+/// What single views say of an estimated lens.
+pub struct LensCheck {
+    pub check: Check,
+    /// Part of the lens's covariance that is the views': what is known beforehand does not scatter.
+    by_views: f64,
+}
+
+impl LensCheck {
+    /// What the covariance of the lens is to be multiplied by, 1 or more.
+    pub fn factor(&self) -> f64 {
+        1.0 + (self.check.ratio - 1.0).max(0.0) * self.by_views
+    }
+}
+
+/// Sum of the squared pulls of single views on the pinhole against what the covariance makes of them; `None` for a given lens, and
+/// where the views do not say.
 pub fn check(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
     shown: ShownEffects<'_>,
     work: &Work<'_>,
-) -> Result<Option<Check>, HandEyeError> {
+) -> Result<Option<LensCheck>, HandEyeError> {
     if !solution.free.intrinsics {
         return Ok(None);
     }
@@ -41,9 +56,10 @@ pub fn check(
     let Some((effects, prior)) = shown.beforehand(problem.board) else { return Ok(None) };
     let n = system.layout.count();
     let count = n + prior.nrows();
-    let mut information = DMatrix::zeros(count, count);
-    information.view_mut((0, 0), (n, n)).copy_from(&system.prior_information(&solution.noise));
-    information.view_mut((n, n), prior.shape()).copy_from(&prior);
+    let mut known = DMatrix::zeros(count, count);
+    known.view_mut((0, 0), (n, n)).copy_from(&system.prior_information(&solution.noise));
+    known.view_mut((n, n), prior.shape()).copy_from(&prior);
+    let mut information = known.clone();
     // With the effects that of a view is large, and not kept.
     let of_view = |view: usize| score(problem, &state, &system, &solution.noise, &effects, view);
     let views = 0..system.blocks.len();
@@ -62,28 +78,39 @@ pub fn check(
     if work.is_cancelled() {
         return Err(HandEyeError::Cancelled);
     }
-    Ok(found.map(|found| {
+    let by_views = by_views(&covariance, &known);
+    Ok(found.zip(by_views).filter(|(found, _)| found.ratio.is_finite()).map(|(found, by_views)| {
         // As for the answer itself: the noise levels come from six numbers per view less the twelve of the two poses.
         let of_noise = 6.0 * views.len() as f64 - 12.0;
         let law = FisherSnedecor::new(found.degrees_of_freedom, of_noise);
-        Check { by: Evidence::Lens, ratio: found.ratio, p_value: law.map_or(f64::NAN, |law| law.sf(found.ratio)) }
+        let p_value = law.map_or(1.0, |law| law.sf(found.ratio));
+        LensCheck { check: Check { by: Evidence::Lens, ratio: found.ratio, p_value }, by_views }
     }))
 }
 
-/// A covariance with that of some unknowns, the lens, multiplied by a factor: what the others owe to the lens grows with it, and
-/// what they would be unsure of with a lens that is known stays.
+/// Part of the covariance `C` of the pinhole that is by the views and not by what is `known` beforehand, in the mean of its
+/// directions: of `C A C` with `A` the information of the views.
+fn by_views(covariance: &DMatrix<f64>, known: &DMatrix<f64>) -> Option<f64> {
+    let rows = covariance.rows(Layout::FORM_AT, PINHOLE);
+    let own = covariance.view((Layout::FORM_AT, Layout::FORM_AT), (PINHOLE, PINHOLE)).into_owned();
+    let by_known = rows * known * rows.transpose();
+    Some(1.0 - own.cholesky()?.solve(&by_known).trace() / PINHOLE as f64)
+}
+
+/// A covariance with that of some unknowns, as those of the lens, multiplied by a factor: what the others owe to them grows with it, and
+/// what the others would be unsure of with these known stays.
 ///
-/// With `C` the covariance and `K = C_·l C_ll⁻¹` how all unknowns follow the lens, it is `C + (factor − 1) K C_ll Kᵀ`.
+/// With `C` the covariance and `K = C_·l C_ll⁻¹` how all unknowns follow those, it is `C + (factor − 1) K C_ll Kᵀ`.
 #[must_use]
-pub fn of_lens(covariance: &DMatrix<f64>, lens: Range<usize>, factor: f64) -> DMatrix<f64> {
-    let of_all = covariance.columns(lens.start, lens.len()).into_owned();
-    let of_lens = covariance.view((lens.start, lens.start), (lens.len(), lens.len()));
+pub fn with_less_known(covariance: &DMatrix<f64>, these: Range<usize>, factor: f64) -> DMatrix<f64> {
+    let of_all = covariance.columns(these.start, these.len()).into_owned();
+    let own = covariance.view((these.start, these.start), (these.len(), these.len()));
     // Focal lengths and coefficients differ by many orders.
-    let scale: Vec<f64> = of_lens.diagonal().iter().map(|v| v.max(f64::MIN_POSITIVE).sqrt().recip()).collect();
-    let scaled = DMatrix::from_fn(lens.len(), lens.len(), |i, j| of_lens[(i, j)] * scale[i] * scale[j]);
+    let scale: Vec<f64> = own.diagonal().iter().map(|v| v.max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+    let scaled = DMatrix::from_fn(these.len(), these.len(), |i, j| own[(i, j)] * scale[i] * scale[j]);
     let Some(root) = scaled.cholesky().map(|factor| factor.l()) else { return covariance * factor };
-    let to_lens = DMatrix::from_fn(lens.len(), of_all.nrows(), |i, j| of_all[(j, i)] * scale[i]);
-    let Some(owed) = root.solve_lower_triangular(&to_lens) else { return covariance * factor };
+    let to_these = DMatrix::from_fn(these.len(), of_all.nrows(), |i, j| of_all[(j, i)] * scale[i]);
+    let Some(owed) = root.solve_lower_triangular(&to_these) else { return covariance * factor };
     covariance + owed.tr_mul(&owed) * (factor - 1.0)
 }
 
@@ -110,8 +137,8 @@ mod tests {
             c[(1, 1)] = 2.0;
             c
         };
-        let widened = of_lens(&with(1.0), 2..4, 5.0);
+        let widened = with_less_known(&with(1.0), 2..4, 5.0);
         assert!((&widened - with(5.0)).amax() < 1e-12, "{widened}");
-        assert!((of_lens(&widened, 2..4, 0.2) - with(1.0)).amax() < 1e-12);
+        assert!((with_less_known(&widened, 2..4, 0.2) - with(1.0)).amax() < 1e-12);
     }
 }

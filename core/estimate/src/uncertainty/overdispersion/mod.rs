@@ -14,9 +14,10 @@
 //! | [`Evidence::Lens`] | how far single views pull an estimated lens |
 //!
 //! The covariance is multiplied by the largest ratio among those that chance explains in fewer than one case in a
-//! hundred, less what the lens explains of it, and by nothing if there is none. What views say of the lens widens the lens alone, and the rest as far as it rests
-//! on the lens ([`of_lens`]), whenever it is more than one: few views refute nothing, and corners that err alike are the rule. All of it is done on the equations linearised at the solution: leaving a
-//! view out takes a product of small matrices, not another fit.
+//! hundred, and by nothing if there is none. What views say of the lens widens the lens alone, and the rest as far as it
+//! rests on the lens ([`with_less_known`]), whenever it is more than one: few views refute nothing, and corners that err
+//! alike are the rule. All of it is done on the equations linearised at the solution: leaving a view out takes a product
+//! of small matrices, not another fit.
 //!
 //! [`PoseDependentError`]: crate::handeye::joint::PoseDependentError
 //!
@@ -32,7 +33,7 @@ mod linear;
 mod neighbours;
 mod permutation;
 
-pub use lens::of_lens;
+pub use lens::with_less_known;
 use serde::{Deserialize, Serialize};
 
 use crate::handeye::HandEyeError;
@@ -103,10 +104,17 @@ pub struct Overdispersion {
     pub factor: f64,
     /// Which evidence asks for it; `None` where none refutes the covariance as it is.
     pub by: Option<Evidence>,
-    /// What the covariance of an estimated lens is to be multiplied by, 1 or more; see [`of_lens`].
+    /// What the covariance of an estimated lens is to be multiplied by, 1 or more; see [`with_less_known`].
     pub lens: f64,
     /// Every check that could be made, none with fewer than [`NEED`] views.
     pub checks: Vec<Check>,
+}
+
+impl Overdispersion {
+    /// Whether the views disagree about an estimated lens by more than chance.
+    pub fn lens_is_refuted(&self) -> bool {
+        self.checks.iter().any(|check| check.by == Evidence::Lens && check.is_significant())
+    }
 }
 
 /// Views from which on checks are made: with fewer no order of them is rarer than one in a hundred.
@@ -133,15 +141,13 @@ pub fn check<'a>(
     let views = linear::views(problem, solution, &work)?;
     let mut checks =
         vec![jackknife::check(&views), neighbours::check(&views), cross_validation::check(problem, solution, &work)?];
-    checks.extend(lens::check(problem, solution, shown, &work)?);
     checks.retain(|check| check.ratio.is_finite() && check.p_value.is_finite());
-    let (of_lens, of_all): (Vec<&Check>, Vec<&Check>) = checks.iter().partition(|c| c.by == Evidence::Lens);
-    let lens = of_lens.first().map_or(1.0, |c| c.ratio.max(1.0));
-    // What views do to the lens they do to the answer, and it is counted once.
-    let counted = solution.widened_by_lens(lens);
-    let refuting = of_all.into_iter().filter(|c| c.is_significant() && c.ratio > counted);
+    let refuting = checks.iter().filter(|c| c.is_significant());
     let largest = refuting.max_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    let (factor, by) = (largest.map_or(1.0, |c| c.ratio / counted), largest.map(|c| c.by));
+    let (factor, by) = (largest.map_or(1.0, |c| c.ratio), largest.map(|c| c.by));
+    let of_lens = lens::check(problem, solution, shown, &work)?;
+    let lens = of_lens.as_ref().map_or(1.0, lens::LensCheck::factor);
+    checks.extend(of_lens.map(|found| found.check));
     Ok(Overdispersion { factor, by, lens, checks })
 }
 

@@ -40,13 +40,17 @@ fn study(trials: u64, views: usize, free: bool, per_metre: f64, noise: &Noise) -
         widened += f64::from(u8::from(widening.by.is_some())) / trials as f64;
         factor += widening.factor / trials as f64;
         let e = t.hand_eye_error(&solution);
-        let squared = e.dot(&(solution.hand_eye_covariance().try_inverse().expect("regular") * e)) / 6.0;
+        let squared = |solution: &JointSolution| {
+            e.dot(&(solution.hand_eye_covariance().try_inverse().expect("regular") * e)) / 6.0
+        };
         let law = solution.small_sample;
         let quantile = f95(6, law.degrees_of_freedom.min(1e6)) / law.scale;
-        covered += usize::from(squared < quantile * widening.factor);
-        covered_formal += usize::from(squared < quantile);
+        let mut stated = solution.clone();
+        stated.widen(&widening);
+        covered += usize::from(squared(&stated) < quantile);
+        covered_formal += usize::from(squared(&solution) < quantile);
         let off = e.fixed_rows::<3>(0) + e.fixed_rows::<3>(3).cross(&solution.reference_point.coords);
-        tip += usize::from(off.norm() < quality::tip_error_95_m(&solution) * widening.factor.sqrt());
+        tip += usize::from(off.norm() < quality::tip_error_95_m(&stated));
         for c in &widening.checks {
             let entry = by.entry(format!("{:?}", c.by)).or_default();
             entry.0 += usize::from(c.is_significant());

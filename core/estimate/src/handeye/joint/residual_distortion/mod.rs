@@ -11,7 +11,7 @@ pub mod shared;
 
 use nalgebra::DMatrix;
 
-use super::effects::{Effect, Equations};
+use super::effects::{Effect, Equations, MostLikely};
 use super::{JointProblem, JointSolution, fit};
 use crate::handeye::{HandEyeError, determined};
 use handeye_geometry::camera::{Intrinsics, ResidualDistortion};
@@ -85,6 +85,26 @@ pub fn with_shown_distortion(
     Ok(shown.zip(last))
 }
 
+/// What a field gains beside an estimate without, of twice the log-likelihood, before it is settled; zero where none is shown.
+///
+/// # Errors
+/// [`HandEyeError::Cancelled`].
+pub fn gain(problem: &JointProblem<'_>, without: &JointSolution, cancel: &CancelToken) -> Result<f64, HandEyeError> {
+    let [.., most] = DEGREES;
+    let all = Equations::new(problem, without, Effect::Distortion(most), cancel)?;
+    Ok(all.and_then(|all| most_likely(&all)).map_or(0.0, |(_, level)| level.gain))
+}
+
+/// The degree and the level with the largest gain; `None` where none is shown.
+fn most_likely(all: &Equations) -> Option<(usize, MostLikely)> {
+    let of_degree = |degree: &usize| {
+        let equations = all.up_to(*degree);
+        equations.may_gain(GAIN).then(|| (*degree, equations.spectrum().most_likely(&LEVELS_PX)))
+    };
+    let tried = DEGREES.iter().filter_map(of_degree);
+    tried.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)).filter(|(_, level)| level.gain >= GAIN)
+}
+
 /// Rounds of field and fit, from the equations `all` of an optimum without a field. `fit` makes a new optimum of the corners
 /// with a field of some degree taken off. `None` where the data show none, or none that settles; else the last fit goes with
 /// the field that is returned.
@@ -94,15 +114,7 @@ pub fn settled<'v, E>(
     views: impl IntoIterator<Item = &'v View>,
     mut fit: impl FnMut(&ResidualDistortion, usize) -> Result<Option<Equations>, E>,
 ) -> Result<Option<ShownDistortion>, E> {
-    let of_degree = |degree: &usize| {
-        let equations = all.up_to(*degree);
-        equations.may_gain(GAIN).then(|| (*degree, equations.spectrum().most_likely(&LEVELS_PX)))
-    };
-    let tried = DEGREES.iter().filter_map(of_degree);
-    let Some((degree, mut level)) = tried.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)) else { return Ok(None) };
-    if level.gain < GAIN {
-        return Ok(None);
-    }
+    let Some((degree, mut level)) = most_likely(all) else { return Ok(None) };
     let (gain, size) = (level.gain, (intrinsics.width, intrinsics.height));
     for round in 1..=MAX_ROUNDS {
         let coefficients = level.coefficients;
