@@ -154,7 +154,7 @@ fn calibrated(set: &Set, half: &[usize], given: bool) -> Option<Calibration> {
     let camera = if given { CameraKnowledge::Fixed(set.intrinsics) } else { CameraKnowledge::NOTHING };
     let observations = Observations {
         mode: Some(set.mode),
-        target: set.target.clone(),
+        target: set.target,
         image_size: set.image_size,
         camera,
         views: half.iter().map(|view| ObservedView::from(&set.views[*view])).collect(),

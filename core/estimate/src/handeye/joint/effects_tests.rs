@@ -42,7 +42,7 @@ fn corners_that_share_nothing_count_together_as_each_for_itself() {
         });
         let (system, state) = (solution.linearised(&problem).expect("linear"), State::of(&solution));
         let effects = [Effect::Print, Effect::Distortion(3)];
-        let of_view = |view| score(&problem, &state, &system, &solution.noise, &effects, view).expect("a score");
+        let of_view = |view| score(&problem, &state, system, &solution.noise, &effects, view).expect("a score");
         let scores: Vec<Score> = (0..views.len()).map(of_view).collect();
         (solution, equations, scores)
     };

@@ -30,7 +30,7 @@ const PINHOLE: usize = 4;
 /// What single views say of an estimated lens.
 pub struct LensCheck {
     pub check: Check,
-    /// Part of the lens's covariance that is the views': what is known beforehand does not scatter.
+    /// Part of the lens's covariance that is not by what is known of it beforehand, which does not scatter.
     by_views: f64,
 }
 
@@ -56,12 +56,12 @@ pub fn check(
     let Some((effects, prior)) = shown.beforehand(problem.board) else { return Ok(None) };
     let n = system.layout.count();
     let count = n + prior.nrows();
-    let mut known = DMatrix::zeros(count, count);
-    known.view_mut((0, 0), (n, n)).copy_from(&system.prior_information(&solution.noise));
-    known.view_mut((n, n), prior.shape()).copy_from(&prior);
-    let mut information = known.clone();
+    let known = system.prior_information(&solution.noise);
+    let mut information = DMatrix::zeros(count, count);
+    information.view_mut((0, 0), (n, n)).copy_from(&known);
+    information.view_mut((n, n), prior.shape()).copy_from(&prior);
     // With the effects that of a view is large, and not kept.
-    let of_view = |view: usize| score(problem, &state, &system, &solution.noise, &effects, view);
+    let of_view = |view: usize| score(problem, &state, system, &solution.noise, &effects, view);
     let views = 0..system.blocks.len();
     for view in views.clone() {
         if work.is_cancelled() {
@@ -78,7 +78,7 @@ pub fn check(
     if work.is_cancelled() {
         return Err(HandEyeError::Cancelled);
     }
-    let by_views = by_views(&covariance, &known);
+    let by_views = by_views(&covariance, &known, solution.lens_places());
     Ok(found.zip(by_views).filter(|(found, _)| found.ratio.is_finite()).map(|(found, by_views)| {
         // As for the answer itself: the noise levels come from six numbers per view less the twelve of the two poses.
         let of_noise = 6.0 * views.len() as f64 - 12.0;
@@ -88,12 +88,12 @@ pub fn check(
     }))
 }
 
-/// Part of the covariance `C` of the pinhole that is by the views and not by what is `known` beforehand, in the mean of its
-/// directions: of `C A C` with `A` the information of the views.
-fn by_views(covariance: &DMatrix<f64>, known: &DMatrix<f64>) -> Option<f64> {
-    let rows = covariance.rows(Layout::FORM_AT, PINHOLE);
+/// Part of the covariance `C` of the pinhole that is not by what is `known` of the lens beforehand, in the mean of its directions: that
+/// is of `C P C`.
+fn by_views(covariance: &DMatrix<f64>, known: &DMatrix<f64>, lens: Range<usize>) -> Option<f64> {
+    let rows = covariance.view((Layout::FORM_AT, lens.start), (PINHOLE, lens.len())).into_owned();
     let own = covariance.view((Layout::FORM_AT, Layout::FORM_AT), (PINHOLE, PINHOLE)).into_owned();
-    let by_known = rows * known * rows.transpose();
+    let by_known = &rows * known.view((lens.start, lens.start), (lens.len(), lens.len())) * rows.transpose();
     Some(1.0 - own.cholesky()?.solve(&by_known).trace() / PINHOLE as f64)
 }
 
@@ -140,5 +140,18 @@ mod tests {
         let widened = with_less_known(&with(1.0), 2..4, 5.0);
         assert!((&widened - with(5.0)).amax() < 1e-12, "{widened}");
         assert!((with_less_known(&widened, 2..4, 0.2) - with(1.0)).amax() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_known_of_a_lens_beforehand_is_not_by_the_views() {
+        let count = Layout::FORM_AT + 9;
+        let lens = Layout::FORM_AT..count;
+        let part = |of_views: f64, beforehand: f64| {
+            let covariance = DMatrix::from_diagonal_element(count, count, (of_views + beforehand).recip());
+            by_views(&covariance, &DMatrix::from_diagonal_element(count, count, beforehand), lens.clone())
+        };
+        for (of_views, beforehand, expected) in [(4.0, 0.0, 1.0), (1.0, 3.0, 0.25), (1e-9, 1.0, 0.0)] {
+            assert!((part(of_views, beforehand).expect("regular") - expected).abs() < 1e-6);
+        }
     }
 }
