@@ -185,7 +185,8 @@ pub(crate) fn arm_fit(
     };
     let Some(fit) = determined(joint::with_stated_error(&with, fit, work.cancel))? else { return Ok(None) };
     // Of several sessions with one lens what that does beyond its model is as uncertain here as by the views of this one.
-    let (mut fit, _) = shown.with_their_error(&with, fit, work.cancel)?;
+    let stated = determined(shown.with_their_error(&with, fit, work.cancel))?;
+    let Some((mut fit, _)) = stated else { return Ok(None) };
     let Some(errors) = fit.arm.clone() else { return Ok(None) };
     let heldout = quality::compared((problem, solution), (&with, &fit), PredictedBy::Links, work.cancel)?;
     let contradicted = match heldout.filter(|heldout| heldout.is_worse) {
@@ -199,7 +200,8 @@ pub(crate) fn arm_fit(
         }
     };
     // Views left out are judged by the model as it is, and what they disagree about counts after that.
-    let widening = overdispersion::check(&with, &fit, shown, work.cancel)?;
+    let widening = determined(overdispersion::check(&with, &fit, shown, work.cancel))?;
+    let Some(widening) = widening else { return Ok(None) };
     fit.widen(&widening);
     if let Some(covariance) = with_uncertain_size(&fit).filter(|_| !is_asked) {
         fit.covariance = covariance;
