@@ -203,7 +203,7 @@ pub(crate) fn arm_fit(
     let widening = determined(overdispersion::check(&with, &fit, shown, work.cancel))?;
     let Some(widening) = widening else { return Ok(None) };
     fit.widen(&widening);
-    if let Some(covariance) = with_uncertain_size(&fit).filter(|_| !is_asked) {
+    if !is_asked && let Some(covariance) = with_uncertain_size(&fit) {
         fit.covariance = covariance;
     }
     let beside = BesideArm { intrinsics: fit.intrinsics, shape: fit.shape, depth: fit.depth, free: fit.free };

@@ -12,7 +12,7 @@ use super::{
 use crate::given_lens;
 use crate::handeye::closed_form::ClosedFormSolution;
 use crate::handeye::consensus::Consensus;
-use crate::handeye::joint::{JointProblem, LensPrior, camera_from_target};
+use crate::handeye::joint::{JointProblem, LensPrior, ShownEffects, camera_from_target};
 use crate::handeye::motion::MIN_VIEWS;
 use crate::handeye::numbering::Turns;
 use crate::handeye::{HandEye, HandEyeError, Mode, PosePair, determined};
@@ -202,9 +202,8 @@ impl Session<'_> {
         }
         let mut calibration = std::mem::take(&mut self.calibration);
         let problem = self.problem(&refined, &fitted, lens);
-        let mut solution = refined.screened.solution.clone();
-        let judged = refine::judge(&problem, &mut solution, refined.shown(), work)?;
-        refined.screened.solution = solution;
+        let shown = ShownEffects { print: refined.print.as_ref(), distortion: refined.distortion.as_ref() };
+        let judged = refine::judge(&problem, &mut refined.screened.solution, shown, work)?;
         take_joint(&mut calibration, &problem, &refined, judged, &self.seen);
         if let Some(joint) = &mut calibration.joint {
             joint.arm = arm_fit(&problem, &refined.screened.solution, refined.shown(), work)?;

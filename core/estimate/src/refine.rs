@@ -183,14 +183,12 @@ impl Refined {
 
     /// The same with the error that may be stated: that of a session by itself, if its lens does more than its model.
     pub fn stated(mut self, problem: &JointProblem<'_>, work: &Work<'_>) -> Result<Self, HandEyeError> {
-        let solution = self.screened.solution.clone();
-        self.screened.solution = joint::with_stated_error(problem, solution, work.cancel)?;
+        let mut solution = joint::with_stated_error(problem, self.screened.solution.clone(), work.cancel)?;
         if let Some(other) = &self.other_depths {
-            self.screened.solution.covariance = other.mixed(&self.screened.solution.covariance);
+            solution.covariance = other.mixed(&solution.covariance);
         }
-        let stated = self.screened.solution.clone();
-        let (stated, sigma_m) = self.shown().with_their_error(problem, stated, work.cancel)?;
-        self.screened.solution = stated;
+        let (solution, sigma_m) = self.shown().with_their_error(problem, solution, work.cancel)?;
+        self.screened.solution = solution;
         if let Some(print) = &mut self.print {
             print.sigma_m = sigma_m;
         }

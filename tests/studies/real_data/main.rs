@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! cargo run --release -p handeye_studies --example real_data -- folds 20
-//! cargo run --release -p handeye_studies --example real_data -- halves 100
+//! cargo run --release -p handeye_studies --example real_data -- halves 40
 //! cargo run --release -p handeye_studies --example real_data -- checks
 //! ```
 //!

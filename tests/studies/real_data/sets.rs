@@ -17,7 +17,7 @@ pub struct Set {
     pub name: String,
     pub mode: Mode,
     pub target: TargetSpec,
-    /// Width and height; with sets that do not state it twice the principal point.
+    /// Width and height.
     pub image_size: (u32, u32),
     pub board: BoardPoints,
     /// Empty corners where the set has pose pairs only.
@@ -101,10 +101,9 @@ fn load(data: &Path, name: &str) -> Set {
         views.push(View::new(image, base_from_tip, found));
     }
     let centre = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64);
-    let image_size = match &json["image_size"] {
-        Value::Array(size) => (size[0].as_u64().expect("width") as u32, size[1].as_u64().expect("height") as u32),
-        _ => ((2.0 * intrinsics.cx).round() as u32, (2.0 * intrinsics.cy).round() as u32),
-    };
+    let first = json["views"][0]["image"].as_str().expect("every view has an image");
+    let image = [folder.join("images").join(first), folder.join(first)].into_iter().find(|path| path.exists());
+    let image_size = image::image_dimensions(image.expect("the images are there")).expect("an image");
     (intrinsics.width, intrinsics.height) = image_size;
     let (target, board) = (target(&json["board"]), BoardPoints::new(&points));
     Set { name: name.to_owned(), mode, target, image_size, board, views, pairs, intrinsics, centre }

@@ -261,7 +261,7 @@ fn fitted(
         factor
     } else {
         let widening = overdispersion::check(&problem, solution, refined.shown(), work.cancel)?;
-        // A chance of one session is none of the weights of all.
+        // By chance the ratio is above one in half of all sessions, and a session does not weigh less for that.
         widening.factor * if widening.lens_is_refuted() { widening.lens } else { 1.0 }
     };
     // What the lens does beyond its model makes it less known than the curvature of the cost says.

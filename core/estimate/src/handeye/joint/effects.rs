@@ -48,11 +48,11 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// Number of coefficients.
-    fn count(self, problem: &JointProblem<'_>) -> usize {
+    /// Number of coefficients, on a target of so many points.
+    fn count(self, points: usize) -> usize {
         2 * match self {
             Self::Distortion(degree) => functions(degree),
-            Self::Print => problem.board.len(),
+            Self::Print => points,
         }
     }
 }
@@ -126,7 +126,7 @@ impl Equations {
             return Ok(None);
         }
         let reduced = system.reduce(noise)?;
-        let (n, k) = (system.layout.count(), effect.count(problem));
+        let (n, k) = (system.layout.count(), effect.count(problem.board.len()));
         let mut sums =
             Sums { information: DMatrix::zeros(k, k), gradient: DVector::zeros(k), cross: DMatrix::zeros(n, k) };
         for index in 0..problem.views.len() {
@@ -282,11 +282,12 @@ impl Products {
         let whitener = problem.whitener(view);
         let seen = problem.seen(state, view, &whitener);
         let rows = Rows::new(&seen, &chain.camera_from_target, problem.free.form());
-        let (by, own) = match (effects, &whitener) {
-            (_, Whitener::Together { .. }) => of_all_rows(&seen, &rows, effects),
-            ([Effect::Distortion(degree)], _) => of_distortion(&seen, &rows, *degree),
-            ([Effect::Print], _) => of_print(&seen, &rows),
-            ([Effect::Print, Effect::Distortion(degree)], _) => of_print_and_distortion(&seen, &rows, *degree),
+        // Where the corners of the view do not err independently every column takes up all rows.
+        let apart = !matches!(whitener, Whitener::Together { .. });
+        let (by, own) = match effects {
+            [Effect::Distortion(degree)] if apart => of_distortion(&seen, &rows, *degree),
+            [Effect::Print] if apart => of_print(&seen, &rows),
+            [Effect::Print, Effect::Distortion(degree)] if apart => of_print_and_distortion(&seen, &rows, *degree),
             _ => of_all_rows(&seen, &rows, effects),
         }?;
         let last = by.nrows() - 1;
@@ -302,19 +303,15 @@ impl Products {
 /// Inner products of the columns of coefficients with those of the pose, those of the form and the residual, and with each other.
 type OfColumns = (DMatrix<f64>, DMatrix<f64>);
 
-/// Of several effects, one behind the other: every column takes up all rows.
+/// Of any effects, one behind the other.
 fn of_all_rows(seen: &ViewInput<'_>, rows: &Rows<'_>, effects: &[Effect]) -> Option<OfColumns> {
     let size = (seen.intrinsics.width, seen.intrinsics.height);
     let points = seen.board.len();
-    let count_of = |effect: &Effect| match effect {
-        Effect::Distortion(degree) => 2 * functions(*degree),
-        Effect::Print => 2 * points,
-    };
-    let count = effects.iter().map(count_of).sum();
+    let count = effects.iter().map(|effect| effect.count(points)).sum();
     let fill = |corner: &Corner, row: &[Pair], columns: &mut [Pair]| {
         let mut from = 0;
         for effect in effects {
-            let columns = &mut columns[from..from + count_of(effect)];
+            let columns = &mut columns[from..from + effect.count(points)];
             from += columns.len();
             match effect {
                 Effect::Distortion(degree) => {

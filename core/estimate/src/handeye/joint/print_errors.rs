@@ -104,13 +104,18 @@ impl PrintErrors {
     /// What is known of the errors before any view, as an information matrix in the order of the points along x and then along y: their
     /// most likely kinds, of the size that they were found to have. `board` has the errors.
     pub fn prior_information(&self, board: &BoardPoints) -> Option<DMatrix<f64>> {
-        let back: Vec<Vector2<f64>> = self.errors_m.iter().map(|error| -error).collect();
-        let kinds = Kinds::of(board.displaced(&back).drawn(), &self.shares);
+        let kinds = self.kinds(board);
         let covariances = kinds.roots.iter().map(|(_, root)| root * root.transpose());
         let mean = covariances.reduce(|a, b| a + b)? / kinds.roots.len() as f64;
         let unknown: f64 =
             self.sigma_m.iter().map(|sigma| sigma * sigma).sum::<f64>() / self.sigma_m.len().max(1) as f64;
         covariance_of(&(mean * (self.rms_m().powi(2) + unknown)))
+    }
+
+    /// Those that are likely, on a target that has the errors.
+    fn kinds(&self, board: &BoardPoints) -> Kinds {
+        let back: Vec<Vector2<f64>> = self.errors_m.iter().map(|error| -error).collect();
+        Kinds::of(board.displaced(&back).drawn(), &self.shares)
     }
 
     fn coefficients(&self) -> DVector<f64> {
@@ -209,9 +214,7 @@ fn at_end(
 ) -> Result<Option<(Equations, Posterior)>, HandEyeError> {
     let Some(equations) = Equations::new(problem, solution, Effect::Print, cancel)? else { return Ok(None) };
     let equations = equations.beyond(&shown.coefficients()).times(shown.used_up);
-    let back: Vec<Vector2<f64>> = shown.errors_m.iter().map(|error| -error).collect();
-    let kinds = Kinds::of(problem.board.displaced(&back).drawn(), &shown.shares);
-    let posterior = Posterior::of(&equations, &kinds, cancel)?;
+    let posterior = Posterior::of(&equations, &shown.kinds(problem.board), cancel)?;
     Ok(Some((equations, posterior)))
 }
 
