@@ -145,6 +145,15 @@ def corners_give_the_answer_with_its_uncertainty(rng):
     assert not near_lens.intrinsics_are_known and max(near_lens.intrinsics.sigma[2:]) < 0.5
     raises(handeye.InputError, "intrinsics_accuracy_px", handeye.calibrate, corners=s.corners, target=BOARD,
            base_from_tip=s.base_from_tip, intrinsics=LENS, intrinsics_accuracy_px=0.0, mode="eye_in_hand")
+    # How near a tool arrives is known where the accuracy of the robot is.
+    assert result.reach_error_95_mm is None and result.robot_accuracy_mm is None
+    accurate = handeye.calibrate(corners=s.corners, target=BOARD, base_from_tip=s.base_from_tip, image_size=SIZE,
+                                 mode="eye_in_hand", robot_accuracy_mm=0.5)
+    assert accurate.robot_accuracy_mm == 0.5 and accurate.tip_error_95_mm == result.tip_error_95_mm
+    assert 1.0 < accurate.reach_error_95_mm < 6.0, accurate.reach_error_95_mm
+    for wrong in (0.0, 500.0, float("nan")):
+        raises(handeye.InputError, "robot_accuracy_mm", handeye.calibrate, corners=s.corners, target=BOARD,
+               base_from_tip=s.base_from_tip, image_size=SIZE, mode="eye_in_hand", robot_accuracy_mm=wrong)
     for covariance in (result.hand_eye_covariance, result.target_covariance):
         assert covariance.shape == (6, 6)
         near(covariance, covariance.T, 1e-15)

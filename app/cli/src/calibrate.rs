@@ -8,8 +8,8 @@ use handeye_estimate::{Method, Options};
 use super::gate::{self, Gate};
 use super::output::Output;
 use crate::rerun_arg;
+use crate::robot_args::RobotArgs;
 use crate::solve::Wanted;
-use crate::tool_arg::ToolArg;
 use crate::{Failure, RerunArg, shared, solve};
 use handeye_record::{Pace, RerunChoice};
 use handeye_workbench::arguments::heading;
@@ -52,7 +52,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "NAME<LIMIT", help_heading = heading::OUTPUT)]
     gate: Vec<Gate>,
     #[command(flatten)]
-    tool: ToolArg,
+    robot: RobotArgs,
     #[command(flatten)]
     rerun: RerunArg,
 }
@@ -72,7 +72,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     };
     let cancel = solve::cancel_on_ctrl_c();
     let recorder = rerun_arg::start(&args.rerun, RerunChoice::Off, Pace::Everything, false)?;
-    let wanted = Wanted { method, options: args.options(), goal_m: Goal::default().0, tool_m: args.tool.tool_m };
+    let wanted = Wanted { method, options: args.options(), goal_m: Goal::default().0, robot: args.robot };
     let solution = solve::folder(path, wanted, None, &cancel)?;
     let result = solution.result();
     if let Some(folder) = &args.out {
@@ -102,8 +102,11 @@ fn several(args: &CalibrateArgs, paths: &[PathBuf], method: Method) -> Result<()
             "`--share-intrinsics` is for the joint estimate: closed forms estimate no lens, leave `--method` out",
         );
     }
-    if args.tool.tool_m.is_some() {
-        return unusable("`--tool` is of one session: leave it out, and write tool_m into [robot] of each data set");
+    if args.robot.is_given() {
+        return unusable(
+            "`--tool` and `--robot-accuracy` are of one session: leave them out, and write tool_m and accuracy_mm into [robot] of each \
+             data set",
+        );
     }
     if args.rerun.choice(RerunChoice::Off) != RerunChoice::Off {
         return unusable("`--rerun` shows one session: leave it out, or calibrate the sessions one by one");

@@ -33,8 +33,8 @@ pub struct DoctorArgs {
 /// Prints the diagnosis. A session that is ill is an answer, not a failure: the exit code is 0.
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
-    let SessionObservations { observations, arm, .. } = solve::read(&args.path, &cancel)?.seen;
-    let wanted = FindingOptions::with_goal_mm(args.goal).with_arm(arm.as_ref());
+    let SessionObservations { observations, arm, robot_accuracy, .. } = solve::read(&args.path, &cancel)?.seen;
+    let wanted = FindingOptions::with_goal_mm(args.goal).with_arm(arm.as_ref()).with_robot_accuracy(robot_accuracy);
     let diagnosis = match calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel) {
         Ok(calibration) => calibration.into_diagnosis(),
         Err(error @ CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(Failure::failed(error)),

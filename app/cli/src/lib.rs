@@ -28,11 +28,11 @@ mod output;
 mod plan;
 mod record;
 mod rerun_arg;
+mod robot_args;
 mod sample;
 mod shared;
 mod solve;
 pub(crate) mod target;
-mod tool_arg;
 mod towards_board;
 mod track;
 
@@ -91,7 +91,7 @@ enum Command {
     Cell(cell::CellArgs),
     /// Drive the robot through poses, capture, solve, and write a session with its exports.
     #[command(after_help = auto::EXAMPLES)]
-    Auto(auto::AutoArgs),
+    Auto(Box<auto::AutoArgs>),
     /// Solve a session or a dataset folder, or several of one camera together.
     #[command(after_help = calibrate::EXAMPLES)]
     Calibrate(calibrate::CalibrateArgs),

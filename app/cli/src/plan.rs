@@ -82,7 +82,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let cancel = solve::cancel_on_ctrl_c();
     let seen = solve::read(&args.path, &cancel)?.seen;
     let observations = seen.observations;
-    let wanted = FindingOptions::default().with_arm(seen.arm.as_ref());
+    let wanted = FindingOptions::default().with_arm(seen.arm.as_ref()).with_robot_accuracy(seen.robot_accuracy);
     let solved = calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel);
     let calibration = solved.map_err(|error| match error {
         CalibrateError::HandEye(HandEyeError::Cancelled) => Failure::failed(error),

@@ -17,6 +17,7 @@ use handeye_result::{CalibrationResult, ViewRecordStatus};
 use handeye_session::{self as session, CaptureId, CaptureRecord, Document, Session, SessionMeta, SessionObservations};
 
 use super::output::Output;
+use super::robot_args::RobotArgs;
 use super::{Failure, out};
 use handeye_record::Recorder;
 use handeye_workbench::model::{Goal, JobId, Observed, Solved, Step, Truth};
@@ -63,8 +64,8 @@ pub fn read(folder: &Path, cancel: &CancelToken) -> Result<Input, Failure> {
         };
         let captures = observations.views.iter().map(id_of).collect();
         let sha256 = dataset.input_sha256().map_err(Failure::unusable)?;
-        let arm = dataset.arm_of_views().and_then(Result::ok);
-        let seen = SessionObservations { observations, captures, verification: Vec::new(), arm };
+        let (arm, robot_accuracy) = (dataset.arm_of_views().and_then(Result::ok), dataset.robot_accuracy());
+        let seen = SessionObservations { observations, captures, verification: Vec::new(), arm, robot_accuracy };
         Input { document: Arc::new(document), seen, sha256 }
     };
     let views = &input.seen.observations.views;
@@ -193,18 +194,16 @@ pub struct Wanted {
     pub options: Options,
     /// The error (95 %) to reach, metres.
     pub goal_m: f64,
-    /// Where the tip of the tool is in the frame of the tip, metres, instead of where the folder has it.
-    pub tool_m: Option<[f64; 3]>,
+    /// What is said of the robot, instead of what the folder says.
+    pub robot: RobotArgs,
 }
 
 /// Reads a folder, finds the target in its images, calibrates, and checks the answer on the captures that are kept for it; the truth
 /// is only compared with.
 pub fn folder(path: &Path, wanted: Wanted, truth: Option<Truth>, cancel: &CancelToken) -> Result<Solution, Failure> {
     let mut input = read(path, cancel)?;
-    let Wanted { method, options, goal_m, tool_m } = wanted;
-    if let (Some(arm), Some(tool_m)) = (&mut input.seen.arm, tool_m) {
-        arm.tool_m = tool_m;
-    }
+    let Wanted { method, options, goal_m, robot } = wanted;
+    robot.put_into(&mut input.seen, &input.document);
     let job = SolveJob { goal_m, truth, ..job(&input, method, options) };
     let solved =
         worker::answer(&job, cancel.into()).map_err(|error| unsolved(error, path, &input.seen.observations, cancel))?;
@@ -213,9 +212,9 @@ pub fn folder(path: &Path, wanted: Wanted, truth: Option<Truth>, cancel: &Cancel
 
 /// What is asked about a folder that was read.
 pub fn job(input: &Input, method: Method, options: Options) -> SolveJob {
-    let SessionObservations { observations, captures, verification, arm } = input.seen.clone();
-    let goal_m = Goal::default().0;
-    SolveJob { id: JobId(0), observations, captures, verification, method, options, goal_m, arm, truth: None }
+    let SessionObservations { observations, captures, verification, arm, robot_accuracy } = input.seen.clone();
+    let (id, goal_m, truth) = (JobId(0), Goal::default().0, None);
+    SolveJob { id, observations, captures, verification, method, options, goal_m, arm, robot_accuracy, truth }
 }
 
 /// Where there is no answer the data may be at fault: how the poses were written is reported at once, the rest by the doctor.
@@ -253,6 +252,8 @@ fn as_document(dataset: &Dataset) -> Document {
         mode: dataset.mode.unwrap_or(Mode::EyeInHand),
         target: dataset.target,
         camera: dataset.camera,
+        tool_m: dataset.tool_m,
+        robot_accuracy_mm: dataset.robot_accuracy_mm,
         ..start::meta(None, String::new())
     });
     for (entry, number) in dataset.entries.iter().zip(1..) {

@@ -407,6 +407,7 @@ mod tests {
             CommandKind::Session(Session::SaveAs),
             CommandKind::Session(Session::Select),
             CommandKind::Session(Session::SetCamera),
+            CommandKind::Session(Session::SetRobotAccuracy),
             CommandKind::Session(Session::SetExcluded),
             CommandKind::Session(Session::SetMode),
             CommandKind::Session(Session::SetPurpose),

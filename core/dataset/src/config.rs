@@ -11,6 +11,7 @@ use super::target_table::{RawTarget, TargetPoseDirection};
 use super::text::line_of;
 use super::value::{AngleUnit, Spanning, bad};
 use handeye_estimate::handeye::Mode;
+use handeye_estimate::robot_accuracy::ROBOT_ACCURACY_MM;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::observations::LENS_ACCURACY_PX;
 use handeye_geometry::targets::TargetSpec;
@@ -39,6 +40,7 @@ struct RawRobot {
     joint_unit: Option<AngleUnit>,
     arm: Option<Spanned<RawArm>>,
     tool_m: Option<Spanned<Vec<f64>>>,
+    accuracy_mm: Option<Spanned<f64>>,
 }
 
 /// A longer tool is in millimetres.
@@ -55,6 +57,8 @@ pub(super) struct RobotConfig {
     pub joints: Option<JointColumns>,
     /// Where the tip of the tool is in the frame of the tip, metres.
     pub tool_m: Option<[f64; 3]>,
+    /// How accurate it is, millimetres.
+    pub accuracy_mm: Option<f64>,
 }
 
 /// How a row of a pose table writes its rotation.
@@ -247,7 +251,9 @@ fn robot_config(raw: &Spanned<RawRobot>) -> Result<RobotConfig, Spanning> {
     };
     let joints = joint_columns(raw.joints.as_ref(), raw.joint_unit, raw.arm.as_ref(), whole.clone())?;
     let tool_m = raw.tool_m.as_ref().map(tool).transpose()?;
-    Ok(RobotConfig { poses: raw.poses.clone(), length_unit: raw.length_unit, rotation, pose: raw.pose, joints, tool_m })
+    let accuracy_mm = raw.accuracy_mm.as_ref().map(robot_accuracy).transpose()?;
+    let (poses, length_unit, pose) = (raw.poses.clone(), raw.length_unit, raw.pose);
+    Ok(RobotConfig { poses, length_unit, rotation, pose, joints, tool_m, accuracy_mm })
 }
 
 fn tool(raw: &Spanned<Vec<f64>>) -> Result<[f64; 3], Spanning> {
@@ -257,6 +263,11 @@ fn tool(raw: &Spanned<Vec<f64>>) -> Result<[f64; 3], Spanning> {
         let (value, want) = (format!("{:?}", raw.get_ref()), "three numbers x, y, z in metres, none beyond 10 m");
         (raw.span(), DatasetProblem::BadValue { key: "tool_m", value, want })
     })
+}
+
+fn robot_accuracy(raw: &Spanned<f64>) -> Result<f64, Spanning> {
+    let want = "a number of millimetres between 0.001 and 100, the root mean square of what the robot is off";
+    if ROBOT_ACCURACY_MM.contains(raw.get_ref()) { Ok(*raw.get_ref()) } else { Err(bad(raw, "accuracy_mm", want)) }
 }
 
 fn camera_config(raw: &Spanned<RawCamera>, row: usize) -> Result<CameraConfig, Spanning> {

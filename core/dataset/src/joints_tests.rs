@@ -165,13 +165,21 @@ fn a_urdf_of_the_data_set_does_as_well_and_the_chain_comes_back_from_what_a_sess
         handeye_estimate::handeye::Mode::EyeInHand,
         &read_urdf.target,
         None,
-        Some(crate::write::Joints::Of(model)),
-        Some([0.0, -0.02, 0.12]),
+        crate::write::Robot {
+            joints: Some(crate::write::Joints::Of(model)),
+            tool_m: Some([0.0, -0.02, 0.12]),
+            accuracy_mm: Some(0.5),
+        },
     );
     let robot = written.split_once("tool_m").expect("joints").1.replace("\"rad\"", "\"deg\"");
     let back = read(&format!("tool_m{robot}"), SIX, &JOINTS_DEG).unwrap_or_else(|why| panic!("{why}\n{written}"));
     assert_eq!(&back.arm.expect("an arm").model, model);
     assert_eq!((back.tool_m, read_urdf.tool_m), (Some([0.0, -0.02, 0.12]), None));
+    assert_eq!((back.robot_accuracy_mm, read_urdf.robot_accuracy_mm), (Some(0.5), None));
+    for bad in ["0", "-0.5", "nan", "200"] {
+        let error = read(&format!("accuracy_mm = {bad}\n"), "", &JOINTS_DEG).expect_err(bad);
+        assert!(error.contains("accuracy_mm") && error.contains("between 0.001 and 100"), "{error}");
+    }
     for bad in ["[0, 0, 120]", "[0, 0.1]", "[0, 0, nan]"] {
         let error = read(&format!("tool_m = {bad}\n"), "", &JOINTS_DEG).expect_err(bad);
         assert!(error.contains("tool_m") && error.contains("three numbers x, y, z in metres"), "{error}");

@@ -63,7 +63,8 @@ use serde::{Deserialize, Serialize};
 
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::placement::{ArmOfViews, PlacementError};
-use handeye_estimate::reach_error::USUAL_TOOL_M;
+use handeye_estimate::reach_error::USUAL_TOOL;
+use handeye_estimate::robot_accuracy::RobotAccuracy;
 use handeye_files::bounds::Bounds;
 pub use handeye_files::own_folder::DESCRIPTION;
 use handeye_geometry::camera::{Distortion, Intrinsics};
@@ -101,6 +102,8 @@ pub struct Dataset {
     pub arm: Option<DatasetArm>,
     /// Where the tip of the tool is in the frame of the tip, metres, where `[robot]` says so.
     pub tool_m: Option<[f64; 3]>,
+    /// How accurate the robot is, millimetres, see [`RobotAccuracy`].
+    pub robot_accuracy_mm: Option<f64>,
     /// What the tables name outside of the folder, through `../`.
     pub outside: Vec<String>,
     pose_table: Option<PathBuf>,
@@ -218,6 +221,7 @@ impl Dataset {
             image_size,
             arm,
             tool_m: config.robot.as_ref().and_then(|robot| robot.tool_m),
+            robot_accuracy_mm: config.robot.as_ref().and_then(|robot| robot.accuracy_mm),
             outside: outside.problems(poses_file.as_ref()),
             pose_table: poses_file.map(|f| f.path),
             text_files,
@@ -233,10 +237,15 @@ impl Dataset {
     pub fn arm_of_views(&self) -> Option<Result<ArmOfViews, PlacementError>> {
         let of = |placement| ArmOfViews {
             placement,
-            tool_m: self.tool_m.unwrap_or([0.0, 0.0, USUAL_TOOL_M]),
+            tool_m: self.tool_m.unwrap_or(USUAL_TOOL),
             joints_rad: self.entries.iter().map(|entry| entry.joints_rad.clone()).collect(),
         };
         Some(self.arm.as_ref()?.placement.clone().map(of))
+    }
+
+    /// How accurate the robot is, with its tool; `None` where nothing was said of it.
+    pub fn robot_accuracy(&self) -> Option<RobotAccuracy> {
+        self.robot_accuracy_mm.map(|mm| RobotAccuracy::new(mm, self.tool_m))
     }
 
     /// Names in the data set and paths of its text files, as they begin the listing of `input_sha256`.

@@ -268,6 +268,10 @@ fn robot_table(text: &mut Text, table: &Found, rotations: &[&str], joints: usize
     if rotations.iter().any(|name| matches!(*name, "rpy" | "rotation_vector")) {
         units(text, "angle_unit", "the rotation", ANGLES, table.largest(4..columns));
     }
+    text.line(format_args!(
+        "{CHOICE}{:<32}# how accurate the robot is, millimetres RMS: a tool arrives within an error that follows from it",
+        "accuracy_mm ="
+    ));
     text.choices(
         "pose",
         &[

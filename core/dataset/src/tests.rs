@@ -302,7 +302,7 @@ fn what_is_written_reads_back_to_the_same_numbers() {
     let pose = Pose::from_translation_xyzw([0.1, -1e-9, 3.0], [0.195832126, 0.036412615, 0.644503346, -0.738200065]);
     let names = ["images/0001.png", "b, \"c\".png"];
     let folder = Folder::new(
-        &write::description(Mode::EyeToHand, &target, Some(&camera), None, None),
+        &write::description(Mode::EyeToHand, &target, Some(&camera), write::Robot::default()),
         &write::pose_table(names.map(|n| (n, &pose))),
         &names,
     );

@@ -31,14 +31,19 @@ impl Joints<'_> {
     }
 }
 
+/// What is said of the robot beside its poses.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Robot<'a> {
+    /// The joint values in the pose table.
+    pub joints: Option<Joints<'a>>,
+    /// Where the tip of the tool is in the frame of the tip, metres.
+    pub tool_m: Option<[f64; 3]>,
+    /// How accurate it is, millimetres.
+    pub accuracy_mm: Option<f64>,
+}
+
 /// The text of `dataset.toml` for a pose table by [`pose_table`], or with joints by [`pose_table_with_joints`].
-pub fn description(
-    mode: Mode,
-    target: &TargetSpec,
-    camera: Option<&CameraInput>,
-    joints: Option<Joints<'_>>,
-    tool_m: Option<[f64; 3]>,
-) -> String {
+pub fn description(mode: Mode, target: &TargetSpec, camera: Option<&CameraInput>, robot: Robot<'_>) -> String {
     let mode = match mode {
         Mode::EyeInHand => "eye_in_hand",
         Mode::EyeToHand => "eye_to_hand",
@@ -48,10 +53,13 @@ pub fn description(
          [robot]\nposes = \"{POSE_TABLE}\"\nlength_unit = \"m\"\nrotation = \"quaternion_xyzw\"\npose = \"base_from_tip\"\n",
         target_table(target)
     );
-    if let Some(tool_m) = tool_m {
+    if let Some(tool_m) = robot.tool_m {
         let _ok = writeln!(text, "tool_m = {tool_m:?}").is_ok();
     }
-    match joints {
+    if let Some(accuracy_mm) = robot.accuracy_mm {
+        let _ok = writeln!(text, "accuracy_mm = {accuracy_mm:?}").is_ok();
+    }
+    match robot.joints {
         Some(Joints::Of(arm)) => text.push_str(&arm_table(arm)),
         Some(Joints::Count(count)) => text.push_str(&joint_columns(count)),
         None => {}

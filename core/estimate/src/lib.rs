@@ -74,6 +74,7 @@
 //! | [`verify`] | predictions for views outside the fit, depth cameras |
 //! | [`corrected_arm`] | where the tip of an arm with errors really is, and what to command instead |
 //! | [`reach_error`] | how near a tool arrives at a point that the camera saw |
+//! | [`robot_accuracy`] | the same where of the arm no more is known than how accurate it is |
 //! | [`clock_offset`], [`resolution`], [`shared_lens`], [`placement`] | clocks of camera and robot, resolution of poses, several cameras of a kind, an arm by its joint values |
 //!
 //! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
@@ -96,6 +97,7 @@ pub mod reach_error;
 mod refine;
 mod residuals;
 pub mod resolution;
+pub mod robot_accuracy;
 pub mod shared_lens;
 pub(crate) mod size;
 pub mod stated_uncertainty;

@@ -36,9 +36,9 @@ use handeye_geometry::targets::TargetSpec;
 /// touches, which is too small over a few: of 24 the 23rd has 23 of 25 below it in the mean, of these the 92nd has 92 of 97.
 const TOUCHES: usize = 96;
 /// Draws of arm and camera.
-const DRAWS: usize = 100;
+pub(crate) const DRAWS: usize = 100;
 /// Every touch is judged by one in so many draws.
-const APART: usize = 4;
+pub(crate) const APART: usize = 4;
 /// Poses in which the tip of the tool is found.
 const PIVOTS: usize = 8;
 /// Distance in metres and angle in radians at which a touch has arrived: far below what it misses by.
@@ -50,12 +50,14 @@ const LEVEL: f64 = 0.95;
 /// Step of differences: metres and radians, of functions that turn over lengths of a metre.
 const STEP: f64 = 1e-6;
 /// Of the draws: the same in every run.
-const SEED: u64 = 0x72_6561_6368;
+pub(crate) const SEED: u64 = 0x72_6561_6368;
 /// Of the touches.
 const TOUCH_SEED: u64 = 0x74_6f75_6368;
 
-/// Length of a tool that nobody has named, along z of the tip, metres.
+/// Length of a tool that nobody has named, metres.
 pub const USUAL_TOOL_M: f64 = 0.1;
+/// The tip of that tool in the frame of the tip: along z.
+pub const USUAL_TOOL: [f64; 3] = [0.0, 0.0, USUAL_TOOL_M];
 
 /// A view of the session.
 #[derive(Debug, Clone)]
@@ -75,8 +77,9 @@ pub struct ReachErrors {
     pub corrected_95_m: Option<f64>,
     /// The part of the first that no view lowers: what the arm is off by its most probable errors, and does not repeat.
     pub as_it_is_least_95_m: f64,
-    /// The part of the other that no view lowers: what the arm does not repeat, at the view, at the touch and where the tool is found.
-    pub repeatability_95_m: f64,
+    /// The part of the error by corrected poses that no view lowers: what the arm does not repeat, at the view, at the touch and where the
+    /// tool is found; `None` where of the arm no more is known than how accurate it is.
+    pub repeatability_95_m: Option<f64>,
 }
 
 impl ReachErrors {
@@ -91,12 +94,13 @@ impl ReachErrors {
     }
 
     /// The larger of both, number by number.
-    fn worse(self, other: Self) -> Self {
+    pub(crate) fn worse(self, other: Self) -> Self {
+        let worse = |a: Option<f64>, b: Option<f64>| a.zip(b).map(|(a, b)| a.max(b));
         Self {
             as_it_is_95_m: self.as_it_is_95_m.max(other.as_it_is_95_m),
-            corrected_95_m: self.corrected_95_m.zip(other.corrected_95_m).map(|(a, b)| a.max(b)),
+            corrected_95_m: worse(self.corrected_95_m, other.corrected_95_m),
             as_it_is_least_95_m: self.as_it_is_least_95_m.max(other.as_it_is_least_95_m),
-            repeatability_95_m: self.repeatability_95_m.max(other.repeatability_95_m),
+            repeatability_95_m: worse(self.repeatability_95_m, other.repeatability_95_m),
         }
     }
 }
@@ -150,7 +154,7 @@ pub struct Reach {
     turned: Vec<UnitQuaternion<f64>>,
     tool: Vector3<f64>,
     /// Turns about one point by which the tool is found.
-    turns: Vec<UnitQuaternion<f64>>,
+    turns: [UnitQuaternion<f64>; PIVOTS],
     /// Arms and cameras that the data allow.
     possible: Vec<Possible>,
     /// The most probable arm and camera, with what the arm does not repeat in each of them.
@@ -161,10 +165,10 @@ pub struct Reach {
 }
 
 /// Which points are touched, from which view, and how the tool is turned against the target.
-struct Plan {
-    view: usize,
-    in_camera: Point3<f64>,
-    turn: UnitQuaternion<f64>,
+pub(crate) struct Plan {
+    pub view: usize,
+    pub in_camera: Point3<f64>,
+    pub turn: UnitQuaternion<f64>,
 }
 
 impl Reach {
@@ -184,8 +188,7 @@ impl Reach {
         let turned = |seen: &Seen| Some(arm.arm.forward(&seen.joints_rad).ok()?.rotation());
         let turned = views.iter().map(turned).collect::<Option<_>>()?;
         let mut random = Draw::new(SEED);
-        let turn = |random: &mut Draw| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5));
-        let turns = (0..PIVOTS).map(|_| turn(&mut random)).collect();
+        let turns = turns(&mut random);
         let possible = possible(fit, &mut random)?;
         let best = |one: &Possible| Possible { errors: fit.errors.clone(), hand_eye: fit.hand_eye, ..one.clone() };
         Some(Self {
@@ -240,7 +243,7 @@ impl Reach {
     }
 
     fn errors(&self, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Option<ReachErrors> {
-        let planned = self.planned(point);
+        let planned = planned(self.views.len(), point);
         let as_it_is = self.touches(&self.as_it_is, &planned)?;
         let corrected = self.touches(&self.corrected, &planned)?;
         let corrected_95_m = self.quantile(&self.corrected, &corrected, &self.possible)?;
@@ -248,7 +251,7 @@ impl Reach {
             as_it_is_95_m: self.quantile(&self.as_it_is, &as_it_is, &self.possible)?,
             corrected_95_m: self.is_corrected.then_some(corrected_95_m),
             as_it_is_least_95_m: self.quantile(&self.as_it_is, &as_it_is, &self.repeated)?,
-            repeatability_95_m: self.quantile(&self.corrected, &corrected, &self.repeated)?,
+            repeatability_95_m: Some(self.quantile(&self.corrected, &corrected, &self.repeated)?),
         })
     }
 
@@ -260,7 +263,7 @@ impl Reach {
         if in_camera.map_or(target.is_empty(), <[Point3<f64>]>::is_empty) {
             return None;
         }
-        let planned = self.planned(|view, random| match in_camera {
+        let planned = planned(self.views.len(), |view, random| match in_camera {
             Some(points) => points[random.below(points.len())],
             None => self.views[view].camera_from_target.isometry() * target[random.below(target.len())],
         });
@@ -297,20 +300,6 @@ impl Reach {
         Some(by_unknowns.tr_mul(&by_unknowns) / touches.len() as f64)
     }
 
-    fn planned(&self, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Vec<Plan> {
-        let mut random = Draw::new(TOUCH_SEED);
-        let plan = |k: usize| {
-            let azimuth = random.even() * std::f64::consts::TAU;
-            let tilt = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * (TILT_RAD * random.even().sqrt());
-            let about = Vector3::z() * random.even() * std::f64::consts::TAU;
-            let view = k * self.views.len() / TOUCHES;
-            let in_camera = point(view, &mut random);
-            let turn = UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(about);
-            Plan { view, in_camera, turn }
-        };
-        (0..TOUCHES).map(plan).collect()
-    }
-
     fn touches(&self, way: &Way, planned: &[Plan]) -> Option<Vec<Touch>> {
         let touches: Vec<Touch> = planned.iter().filter_map(|plan| way.touch(&self.views, plan, &self.tool)).collect();
         (4 * touches.len() >= planned.len()).then_some(touches)
@@ -325,26 +314,17 @@ impl Reach {
             let its_touches = touches.iter().skip(k % APART).step_by(APART);
             distances.extend(its_touches.map(|touch| Way::miss(touch, truth, &self.tool, &found).norm()));
         }
-        distances.sort_by(f64::total_cmp);
-        Some(distances[((distances.len() as f64 * LEVEL) as usize).min(distances.len() - 1)])
+        quantile(distances)
     }
 }
 
 impl Way {
-    /// Where the camera is when the tip is there.
-    fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isometry3<f64> {
-        match hand_eye {
-            HandEye::EyeInHand { tip_from_camera, .. } => base_from_tip * tip_from_camera.isometry(),
-            HandEye::EyeToHand { base_from_camera, .. } => *base_from_camera.isometry(),
-        }
-    }
-
     fn touch(&self, views: &[Seen], plan: &Plan, tool: &Vector3<f64>) -> Option<Touch> {
         let seen = &views[plan.view];
         let view = At::new(&self.arm.arm, &seen.joints_rad)?;
         let in_camera = plan.in_camera;
         let base_from_tip = view.tip(&self.arm.errors);
-        let base_from_camera = Self::camera(&self.hand_eye, &base_from_tip);
+        let base_from_camera = camera(&self.hand_eye, &base_from_tip);
         let along = match self.hand_eye.mode() {
             // A target's z axis points away from who looks at it.
             Mode::EyeInHand => base_from_camera.rotation * seen.camera_from_target.isometry().rotation,
@@ -407,11 +387,38 @@ impl Way {
     /// From the point to the tip of the tool.
     fn miss(touch: &Touch, draw: &Possible, tool: &Vector3<f64>, found: &Vector3<f64>) -> Vector3<f64> {
         let at_view = touch.view.tip(&draw.errors) * draw.unexplained.view;
-        let point = Self::camera(&draw.hand_eye, &at_view) * touch.in_camera;
+        let point = camera(&draw.hand_eye, &at_view) * touch.in_camera;
         let tip = touch.command.tip(&draw.errors) * draw.unexplained.touch * Point3::from(*tool);
         // The command was for the tool as it is.
         tip - point - touch.turn * (found - tool)
     }
+}
+
+/// Touches that are spread evenly over the views; `point` is where in the camera one of a view is.
+pub(crate) fn planned(views: usize, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Vec<Plan> {
+    let mut random = Draw::new(TOUCH_SEED);
+    let plan = |k: usize| {
+        let azimuth = random.even() * std::f64::consts::TAU;
+        let tilt = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * (TILT_RAD * random.even().sqrt());
+        let about = Vector3::z() * random.even() * std::f64::consts::TAU;
+        let view = k * views / TOUCHES;
+        let in_camera = point(view, &mut random);
+        let turn = UnitQuaternion::from_scaled_axis(tilt) * UnitQuaternion::from_scaled_axis(about);
+        Plan { view, in_camera, turn }
+    };
+    (0..TOUCHES).map(plan).collect()
+}
+
+/// Turns about one point by which the tip of a tool is found.
+pub(crate) fn turns(random: &mut Draw) -> [UnitQuaternion<f64>; PIVOTS] {
+    std::array::from_fn(|_| UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| random.even() - 0.5)))
+}
+
+/// The distance that 95 % of these stay under.
+pub(crate) fn quantile(mut distances: Vec<f64>) -> Option<f64> {
+    distances.sort_by(f64::total_cmp);
+    let last = distances.len().checked_sub(1)?;
+    Some(distances[((distances.len() as f64 * LEVEL) as usize).min(last)])
 }
 
 /// An arm and a camera that the data allow.
@@ -478,8 +485,16 @@ fn mean_axis(arm: &Arm, views: &[Seen]) -> Option<Vector3<f64>> {
     axes.sum::<Vector3<f64>>().try_normalize(1e-9)
 }
 
+/// Where the camera is when the tip is there.
+pub(crate) fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isometry3<f64> {
+    match hand_eye {
+        HandEye::EyeInHand { tip_from_camera, .. } => base_from_tip * tip_from_camera.isometry(),
+        HandEye::EyeToHand { base_from_camera, .. } => *base_from_camera.isometry(),
+    }
+}
+
 /// A turn whose z axis is along a direction.
-fn facing(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub(crate) fn facing(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), direction)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }

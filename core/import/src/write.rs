@@ -16,7 +16,7 @@ use super::settings::Settings;
 use super::sight::{recorded_corners, size_of_points};
 use handeye_dataset::CameraInput;
 use handeye_dataset::write::{
-    Joints, POSE_TABLE, description, description_of_images, pose_table, pose_table_with_joints,
+    Joints, POSE_TABLE, Robot, description, description_of_images, pose_table, pose_table_with_joints,
 };
 use handeye_estimate::diagnose::hypotheses::rules_out;
 use handeye_files::atomic_file;
@@ -170,7 +170,8 @@ pub fn plan(h: &Hypothesis, known: &Context<'_>, link_to: Option<&Path>) -> Plan
         intrinsics: Some(camera.intrinsics),
         model: camera.intrinsics.distortion,
     });
-    let body = description(h.mode, &target, camera.as_ref(), with_joints.then_some(Joints::Count(joints)), None);
+    let robot = Robot { joints: with_joints.then_some(Joints::Count(joints)), ..Robot::default() };
+    let body = description(h.mode, &target, camera.as_ref(), robot);
     if let Some(recorded) = &recorded {
         let key = format!("corners = \"{CORNERS}\"\n\n[robot]");
         text.push_str(&body.replacen("\n[robot]", &key, 1));

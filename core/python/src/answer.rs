@@ -1,7 +1,7 @@
 //! Calibrations and diagnoses, as the documents that the command line writes.
 
 use handeye_estimate::diagnose::doctor::{self, Detail};
-use handeye_estimate::diagnose::findings::{Finding, FindingOptions};
+use handeye_estimate::diagnose::findings::Finding;
 use handeye_estimate::diagnose::{Calibration, calibrate_with};
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::{CalibrateError, Method, Options};
@@ -40,7 +40,7 @@ pub fn calibrate(
     }
     let (mut result, sigmas, other_chain) = run(py, progress, |work| {
         let observed = &observations.observed;
-        let wanted = FindingOptions::with_goal_mm(goal_mm).with_arm(observations.arm());
+        let wanted = observations.wanted(goal_mm);
         let calibration = calibrate_with(observed, method, options, &wanted, work)?;
         let (result, other_chain) = document(observations, &calibration, method, options);
         Ok((result, calibration.pose_fit.map(|fit| (fit.sigma_m, fit.sigma_rad)), other_chain))
@@ -60,7 +60,7 @@ pub fn diagnose(
     let observations = observations.get();
     run(py, progress, |work| {
         let observed = &observations.observed;
-        let wanted = FindingOptions::with_goal_mm(goal_mm).with_arm(observations.arm());
+        let wanted = observations.wanted(goal_mm);
         let diagnosis = match calibrate_with(observed, Method::Joint, Options::default(), &wanted, work) {
             Ok(calibration) => calibration.into_diagnosis(),
             Err(CalibrateError::HandEye(HandEyeError::Cancelled)) => return Err(HandEyeError::Cancelled.into()),

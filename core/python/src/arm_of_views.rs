@@ -6,7 +6,7 @@ use handeye_arm::urdf::Urdf;
 use handeye_arm::{Arm, ArmKind, ArmModel};
 use handeye_estimate::ObservedView;
 use handeye_estimate::placement::{ArmOfViews, JointView, PlacementError, place_checked};
-use handeye_estimate::reach_error::USUAL_TOOL_M;
+use handeye_estimate::reach_error::USUAL_TOOL;
 use serde::Deserialize;
 
 use crate::error::Failure;
@@ -77,7 +77,7 @@ pub fn placed(
             for (view, frames) in views.iter_mut().zip(of_views) {
                 view.tip_from_joints = frames;
             }
-            let (tool_m, joints_rad) = ([0.0, 0.0, USUAL_TOOL_M], joints_rad.into_iter().map(Some).collect());
+            let (tool_m, joints_rad) = (USUAL_TOOL, joints_rad.into_iter().map(Some).collect());
             Ok(Ok(ArmOfViews { placement, tool_m, joints_rad }))
         }
         Err(why) => Ok(Err(why)),

@@ -80,12 +80,13 @@ pub fn read_folder(py: Python<'_>, folder: PathBuf) -> Result<(Observations, Str
         "names": entries.iter().map(|entry| &entry.name).collect::<Vec<_>>(),
         "image_paths": entries.iter().map(|entry| &entry.image_path).collect::<Vec<_>>(),
         "joints_rad": entries.iter().map(|entry| &entry.joints_rad).collect::<Vec<_>>(),
+        "robot_accuracy_mm": dataset.robot_accuracy_mm,
         "notes": dataset.outside,
     });
     let observed = dataset.observations(|_image| None);
-    let arm = dataset.arm_of_views();
+    let (arm, robot_accuracy) = (dataset.arm_of_views(), dataset.robot_accuracy());
     let folder = Some(Folder { dataset, listing });
-    Ok((Observations { observed, folder, target_is_known: true, arm }, described.to_string(), arrays))
+    Ok((Observations { observed, folder, target_is_known: true, arm, robot_accuracy }, described.to_string(), arrays))
 }
 
 fn matrix(pose: Option<Vec<f64>>) -> Vec<f64> {

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use handeye_estimate::diagnose::findings::FindingOptions;
 use handeye_estimate::handeye::Mode;
 use handeye_estimate::placement::{ArmOfViews, PlacementError};
+use handeye_estimate::robot_accuracy::RobotAccuracy;
 use handeye_estimate::{CameraKnowledge, DEFAULT_MODEL, KnownLens, Observations as Observed, ObservedView};
 use handeye_geometry::camera::{Distortion, Intrinsics};
 use handeye_geometry::frames::{Base, Camera, Pose, Target, Tip};
@@ -38,6 +40,7 @@ struct Description {
     model: Option<String>,
     names: Vec<String>,
     arm: Option<ArmDescription>,
+    robot_accuracy_mm: Option<f64>,
 }
 
 /// Intrinsics as Python has them.
@@ -91,6 +94,8 @@ pub struct Observations {
     pub target_is_known: bool,
     /// The arm, where its joints in the views are known; why they are not used otherwise.
     pub arm: Option<Result<ArmOfViews, PlacementError>>,
+    /// How accurate the robot is, where something was said of it.
+    pub robot_accuracy: Option<RobotAccuracy>,
 }
 
 /// Corners of a view: their numbers, all of the target where they are left out, and pixels u, v.
@@ -100,6 +105,11 @@ impl Observations {
     /// The arm, where it is known and belongs to the poses.
     pub fn arm(&self) -> Option<&ArmOfViews> {
         self.arm.as_ref()?.as_ref().ok()
+    }
+
+    /// What is wanted of their calibration.
+    pub fn wanted(&self, goal_mm: Option<f64>) -> FindingOptions<'_> {
+        FindingOptions::with_goal_mm(goal_mm).with_arm(self.arm()).with_robot_accuracy(self.robot_accuracy)
     }
 }
 
@@ -115,8 +125,10 @@ impl Observations {
         camera_from_target: Option<&[u8]>,
         joints: Option<&[u8]>,
     ) -> Result<Self, Failure> {
-        let Description { mode, target, image_size, known, known_px, start, model: lens_model, names, arm } =
-            serde_json::from_str(description).map_err(Failure::input)?;
+        let described: Description = serde_json::from_str(description).map_err(Failure::input)?;
+        let Description { mode, target, image_size, known, known_px, start, model: lens_model, names, arm, .. } =
+            described;
+        let robot_accuracy = described.robot_accuracy_mm.map(|mm| RobotAccuracy::new(mm, None));
         if let Some(target) = &target {
             target.check().map_err(Failure::input)?;
         }
@@ -159,7 +171,7 @@ impl Observations {
         let arm = arm.zip(joints).map(|(arm, joints)| placed(arm, joints, &mut views)).transpose()?;
         let image_size = image_size.unwrap_or_default();
         let observed = Observed { mode, target: spec, image_size, camera, views };
-        Ok(Self { observed, folder: None, target_is_known: target.is_some(), arm })
+        Ok(Self { observed, folder: None, target_is_known: target.is_some(), arm, robot_accuracy })
     }
 
     /// Why joint values that are there are not used; nothing where they are.

@@ -92,6 +92,7 @@ impl CalibrationResult {
             ("quality.tip_error_95_mm", q.tip_error_95_mm),
             ("quality.reach_error_95_mm", q.reach_error_95_mm),
             ("quality.reach_error_corrected_95_mm", q.reach_error_corrected_95_mm),
+            ("quality.robot_accuracy_mm", q.robot_accuracy_mm),
             ("quality.robot_sigma_mm", q.robot_sigma_mm),
             ("quality.robot_sigma_deg", q.robot_sigma_deg),
         ];

@@ -238,12 +238,15 @@ pub struct Quality {
     /// Expected error where the tool works: 95 % of the errors are below, millimetres.
     pub tip_error_95_mm: Option<f64>,
     /// Distance between a point that the camera saw and the tip of a tool that is sent there by the controller as it is: 95 % are
-    /// below, millimetres; `None` where the arm is not known, does not get there, or is contradicted by views left out.
+    /// below, millimetres; `None` where neither the errors of the arm are known nor the accuracy of the robot.
     #[serde(default)]
     pub reach_error_95_mm: Option<f64>,
     /// The same by corrected poses and commands; `None`, too, where the controller counts with another chain.
     #[serde(default)]
     pub reach_error_corrected_95_mm: Option<f64>,
+    /// How accurate the robot was said to be, where the reach error follows from that and not from the errors of its arm, millimetres.
+    #[serde(default)]
+    pub robot_accuracy_mm: Option<f64>,
     /// Estimated noise of the robot's positions, millimetres per axis.
     pub robot_sigma_mm: Option<f64>,
     /// Estimated noise of the robot's rotations, degrees per axis.

@@ -50,6 +50,7 @@ impl CalibrationResult {
                 tip_error_95_mm: calibration.tip_error_95_m().map(|m| m * 1e3),
                 reach_error_95_mm: reach.map(|reach| reach.as_it_is_95_m * 1e3),
                 reach_error_corrected_95_mm: reach.and_then(|reach| reach.corrected_95_m).map(|m| m * 1e3),
+                robot_accuracy_mm: calibration.robot_accuracy().map(|robot| robot.error_m * 1e3),
                 robot_sigma_mm: noise.map(|n| n.robot_m * 1e3),
                 robot_sigma_deg: noise.map(|n| n.robot_rad.to_degrees()),
             },

@@ -36,8 +36,11 @@ impl Document {
     /// these captures has them. Without a robot there is no table.
     pub(super) fn as_dataset(&self) -> (String, Option<String>) {
         let meta = &self.meta;
-        let describe =
-            |joints| dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), joints, meta.tool_m);
+        let describe = |joints| {
+            let (tool_m, accuracy_mm) = (meta.tool_m, meta.robot_accuracy_mm);
+            let robot = dataset::write::Robot { joints, tool_m, accuracy_mm };
+            dataset::write::description(meta.mode, &meta.target, meta.camera.as_ref(), robot)
+        };
         if self.mode().is_none() {
             let images = self.in_use().map(|capture| capture.image.as_str());
             let description = dataset::write::description_of_images(images, &meta.target, meta.camera.as_ref());

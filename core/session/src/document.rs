@@ -12,6 +12,7 @@ use handeye_dataset::pose_record;
 use handeye_dataset::taught_poses::{Goal, TaughtPose};
 use handeye_dataset::{CameraInput, LONGEST_TOOL_M};
 use handeye_estimate::handeye::{HandEye, Mode};
+use handeye_estimate::robot_accuracy::ROBOT_ACCURACY_MM;
 use handeye_export::ExportView;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -60,6 +61,9 @@ pub struct SessionMeta {
     /// Where the tip of the tool is in the frame of the tip, metres; without it a usual one is counted with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_m: Option<[f64; 3]>,
+    /// How accurate the robot is, millimetres, see [`RobotAccuracy`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot_accuracy_mm: Option<f64>,
     /// How the joints of an arm that is not known move, from the base up. Without it they are taken for six that turn, as
     /// they were in sessions that were written before there were others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -229,6 +233,9 @@ impl SessionMeta {
         }
         if self.tool_m.iter().flatten().any(|metres| !(-LONGEST_TOOL_M..=LONGEST_TOOL_M).contains(metres)) {
             return Err(bad("tool_m", text!("is not finite, or longer than {most} m", most = LONGEST_TOOL_M)));
+        }
+        if self.robot_accuracy_mm.is_some_and(|mm| !ROBOT_ACCURACY_MM.contains(&mm)) {
+            return Err(bad("robot_accuracy_mm", text!("is not between 0.001 and 100 mm")));
         }
         if self.joint_kinds.as_ref().is_some_and(|kinds| kinds.is_empty() || kinds.len() > MAX_JOINTS) {
             return Err(bad("joint_kinds", text!("has no joints, or more than an arm has")));

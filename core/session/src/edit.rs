@@ -40,6 +40,8 @@ pub enum Edit {
     SetMode(Mode),
     /// Something else is known of the camera beforehand.
     SetCamera(Option<CameraInput>),
+    /// The robot is known to be so accurate, millimetres; `None` where that is not known.
+    SetRobotAccuracy(Option<f64>),
     /// Other taught poses.
     SetTaught {
         /// What was done to them.
@@ -78,6 +80,7 @@ impl Document {
             Edit::SetTarget(target) => next.meta.target = *target,
             Edit::SetMode(mode) => next.meta.mode = *mode,
             Edit::SetCamera(camera) => next.meta.camera = *camera,
+            Edit::SetRobotAccuracy(mm) => next.meta.robot_accuracy_mm = *mm,
             Edit::SetTaught { change, poses } => {
                 check_taught(poses)?;
                 if !change.fits(&self.taught, poses) {
@@ -137,6 +140,7 @@ impl fmt::Display for Edit {
             Self::SetTarget(_) => f.write_str("change of target"),
             Self::SetMode(to) => write!(f, "change to {}", mode(to)),
             Self::SetCamera(_) => f.write_str("change of camera"),
+            Self::SetRobotAccuracy(_) => f.write_str("change of robot accuracy"),
             Self::SetTaught { change, .. } => change.fmt(f),
             Self::SetExportNames(_) => f.write_str("change of export names"),
         }

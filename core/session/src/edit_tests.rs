@@ -59,6 +59,10 @@ fn every_edit_changes_what_it_names_and_nothing_else() {
     assert_eq!(after(&before, &Edit::SetTarget(target)).meta.target, target);
     assert_eq!(after(&before, &Edit::SetMode(Mode::EyeToHand)).meta.mode, Mode::EyeToHand);
     assert_eq!(after(&before, &Edit::SetCamera(None)).meta.camera, None);
+    assert_eq!(after(&before, &Edit::SetRobotAccuracy(Some(0.5))).meta.robot_accuracy_mm, Some(0.5));
+    for mm in [0.0, -1.0, f64::NAN, 500.0] {
+        assert!(matches!(before.apply(&Edit::SetRobotAccuracy(Some(mm))), Err(EditError::Bad { .. })), "{mm}");
+    }
     let named = after(&before, &Edit::SetExportNames(json!({"base": "base_link"})));
     assert_eq!(named.export_names, Some(json!({"base": "base_link"})));
     assert_eq!(after(&named, &Edit::SetExportNames(json!(null))), before);

@@ -35,6 +35,7 @@
 //!     arm: None,
 //!     joint_kinds: None,
 //!     tool_m: None,
+//!     robot_accuracy_mm: None,
 //! };
 //! let mut store = Store::create(&folder.path().join("session"), meta)?;
 //! store.apply(Edit::SetMode(Mode::EyeToHand))?;

@@ -6,7 +6,8 @@ use super::capture_id::CaptureId;
 use super::document::{Document, Role};
 use handeye_dataset::CameraInput;
 use handeye_estimate::placement::{ArmOfViews, Placement, PlacementError};
-use handeye_estimate::reach_error::USUAL_TOOL_M;
+use handeye_estimate::reach_error::USUAL_TOOL;
+use handeye_estimate::robot_accuracy::RobotAccuracy;
 use handeye_estimate::{Observations, ObservedView};
 use handeye_geometry::targets::observation::{Sight, View};
 
@@ -22,6 +23,8 @@ pub struct SessionObservations {
     pub verification: Vec<(CaptureId, View)>,
     /// The arm, where the joint angles of the captures are used.
     pub arm: Option<ArmOfViews>,
+    /// How accurate the robot is, where something was said of it.
+    pub robot_accuracy: Option<RobotAccuracy>,
 }
 
 impl Document {
@@ -50,9 +53,10 @@ impl Document {
             verification: Vec::new(),
             arm: placement.map(|placement| ArmOfViews {
                 placement,
-                tool_m: self.meta.tool_m.unwrap_or([0.0, 0.0, USUAL_TOOL_M]),
+                tool_m: self.meta.tool_m.unwrap_or(USUAL_TOOL),
                 joints_rad: Vec::new(),
             }),
+            robot_accuracy: self.meta.robot_accuracy_mm.map(|mm| RobotAccuracy::new(mm, self.meta.tool_m)),
         };
         for capture in &self.captures {
             let sight = sights(capture.id);

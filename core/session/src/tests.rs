@@ -36,6 +36,7 @@ pub(super) fn meta() -> SessionMeta {
         arm: None,
         joint_kinds: None,
         tool_m: None,
+        robot_accuracy_mm: None,
     }
 }
 

@@ -1,12 +1,13 @@
 //! What the errors of an arm do to a touched point, and what is left of them once the command is corrected.
 //!
-//!     cargo run --release -p handeye_studies --example arm_errors -- CSV|ARM [VIEWS] [lens] [guided] [unknown] [exact] [joints] [bent|square|lens-off|late] [accuracy=PX] [sessions=40] [KIND…]
+//!     cargo run --release -p handeye_studies --example arm_errors -- CSV|ARM [VIEWS] [lens] [guided] [unknown|poses] [exact] [joints] [bent|square|lens-off|late] [accuracy=PX] [sessions=40] [KIND…]
 //!
 //! With a CSV of factory calibrations (its columns: `arm, model, link, x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad`) an arm moves by
 //! it, and its controller believes the numbers of the data sheet: one session an arm and a set-up. With `joints` the joints give way
 //! under 2 kg and have gears as well; with `exact` the arms are as their data sheets have them. With the name of an arm (`ur5e`,
 //! `panda`, `xarm6`) errors of each kind are drawn, one arm a session; with `bent`, `square`, `lens-off` or `late` something else is wrong
-//! as well. `accuracy` is what is said of the lens that is given, which is else taken as exact.
+//! as well. With `poses` no joints are known but how accurate the robot is: what it is off over 300 views, base and tip where that is
+//! least. `accuracy` is what is said of the lens that is given, which is else taken as exact.
 //!
 //! Corners have 0.1 px of noise, the arm repeats to 0.02 mm and 0.005°. A tool of 120 mm, whose tip was found by the same arm about one
 //! point, is sent to points that the camera saw; the distance between the two is printed, RMS over 40 points a session. Beside it
@@ -33,7 +34,7 @@ use rayon::prelude::*;
 use cell::{Cell, Wrong};
 use chain::model;
 use real::{Kind, Real};
-use session::{Asked, Touched, Unknown, session, unknown};
+use session::{Asked, ByAccuracy, Touched, Unknown, by_accuracy, session, unknown};
 
 /// What ends the study.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -65,7 +66,7 @@ fn run() -> Result<(), Failure> {
         return Err("what else is wrong is for drawn arms with random views and a known chain".into());
     }
     if is_file {
-        return of_file(what, asked, given("exact"), given("joints"));
+        return of_file(what, asked, ["exact", "joints", "poses"].map(given));
     }
     let sessions = arguments.iter().find_map(|argument| argument.strip_prefix("sessions="));
     let sessions: u64 = sessions.map_or(Ok(40), str::parse)?;
@@ -73,6 +74,8 @@ fn run() -> Result<(), Failure> {
     let kinds = if kinds.is_empty() { Kind::ALL.to_vec() } else { kinds };
     if given("unknown") {
         of_unknown((what, wrong), asked, sessions, &kinds);
+    } else if given("poses") {
+        of_poses((what, wrong), asked, sessions, &kinds);
     } else {
         of_drawn((what, wrong), asked, sessions, &kinds);
     }
@@ -116,16 +119,53 @@ fn of_unknown(what @ (name, wrong): (&str, Wrong), asked: Asked, count: u64, kin
     }
 }
 
+/// Robots of which the program is told how accurate they are, and no more.
+fn of_poses(what @ (name, _): (&str, Wrong), asked: Asked, count: u64, kinds: &[Kind]) {
+    for (set_up, mode) in SET_UPS {
+        for kind in kinds {
+            let one = |seed: u64| by_accuracy(&drawn(what, *kind, mode, seed)?, asked, 1000 + seed);
+            let sessions: Vec<ByAccuracy> = (0..count).into_par_iter().filter_map(|seed| one(seed).ok()).collect();
+            row_by_accuracy(&format!("{name}, {set_up}, {}", kind.name()), &sessions);
+        }
+    }
+}
+
+/// Medians over sessions.
+fn row_by_accuracy(name: &str, sessions: &[ByAccuracy]) {
+    let middle = |of: &dyn Fn(&ByAccuracy) -> f64| median(sessions.iter().map(of)).unwrap_or(f64::NAN);
+    let within = sessions.iter().map(|s| s.within).sum::<f64>() / sessions.len().max(1) as f64;
+    println!(
+        "| {name} | {} | {:.3} mm, {:.4}° ({:.1} rad/m) | {:.3} | {:.3} | {:.1} % |",
+        sessions.len(),
+        middle(&|s| s.accuracy[0]),
+        middle(&|s| s.accuracy[1]),
+        middle(&|s| s.accuracy[1].to_radians() / s.accuracy[0] * 1e3),
+        middle(&|s| s.touch_mm),
+        middle(&|s| s.stated_mm),
+        100.0 * within,
+    );
+}
+
 /// Arms of a file, one line each.
-fn of_file(path: &str, asked: Asked, exact: bool, joints: bool) -> Result<(), Failure> {
+fn of_file(path: &str, asked: Asked, [exact, joints, poses]: [bool; 3]) -> Result<(), Failure> {
     let csv = std::fs::read_to_string(path)?;
     for (name, mode) in SET_UPS {
-        let one = |arm: usize, kind: &str, truth: chain::Chain| {
+        let cell = |arm: usize, kind: &str, truth: chain::Chain| -> Result<Cell, Failure> {
             let model = model(kind)?;
             let real = Real::of_links(if exact { model.believed.clone() } else { truth });
             let rng = &mut ChaCha8Rng::seed_from_u64(arm as u64);
             let real = if joints { real.with_joints(&model, rng) } else { real };
-            let cell = Cell::new(kind, model, real, Kind::Links.repeats(), mode);
+            Ok(Cell::new(kind, model, real, Kind::Links.repeats(), mode))
+        };
+        if poses {
+            let sessions = chain::read(&csv)?.into_par_iter().filter_map(|(arm, (kind, truth))| {
+                by_accuracy(&cell(arm, &kind, truth).ok()?, asked, 100 + arm as u64).ok()
+            });
+            row_by_accuracy(name, &sessions.collect::<Vec<_>>());
+            continue;
+        }
+        let one = |arm: usize, kind: &str, truth: chain::Chain| {
+            let cell = cell(arm, kind, truth)?;
             session(&cell, Asked { of_links: !joints, ..asked }, 100 + arm as u64)
         };
         let sessions: Vec<_> = chain::read(&csv)?

@@ -7,16 +7,18 @@ use handeye_estimate::diagnose::{Calibration, calibrate_with};
 use handeye_estimate::handeye::HandEye;
 use handeye_estimate::handeye::joint::{ArmErrors, LEVELS_OF_ARMS, LinkError, arm_parameters};
 use handeye_estimate::placement::{ArmOfViews, JointView, Placement, place_checked};
+use handeye_estimate::robot_accuracy::RobotAccuracy;
 use handeye_estimate::{ArmFit, CameraKnowledge, KnownLens, Method, Observations, ObservedView, Options};
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_geometry::progress::CancelToken;
 use handeye_simulate::links::shift_and_turn;
-use nalgebra::{DMatrix, DVector, Isometry3, Translation3, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use crate::Failure;
 use crate::cell::{Cell, TARGET, TRIES, Taken};
+use crate::chain::between;
 
 const TOUCHES: usize = 40;
 
@@ -93,7 +95,6 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
         .reach_errors()
         .and_then(|reach| Some([reach.as_it_is_95_m, reach.corrected_95_m?]))
         .unwrap_or([f64::NAN; 2]);
-    let mount = |of: &HandEye| *of.mount_from_camera().isometry();
     let mut within = [0.0; 2];
     let (mut squared, mut count) = ([0.0; 3], 0.0);
     for _ in 0..TRIES {
@@ -103,15 +104,11 @@ pub fn session(cell: &Cell, asked: Asked, seed: u64) -> Result<Touched, Failure>
         let view = &taken[rng.random_range(0..taken.len())];
         let (in_camera, truth) = cell.point(view, &mut rng);
         let down = cell.down(&taken, &mut rng);
-        // By the controller as it is.
-        let by_controller = |hand_eye: &HandEye| {
-            let seen = cell.camera_at(&believed(&view.joints), &mount(hand_eye)) * in_camera;
-            let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-plain_tool);
-            cell.believed_joints(&goal, &view.joints)
-        };
-        let (Some(plain), Some(by_park)) = (by_controller(&hand_eye), by_controller(&park)) else { continue };
+        let as_it_is = Touch { view, in_camera, down, tool: plain_tool };
+        let by_controller = [&hand_eye, &park].map(|hand_eye| as_it_is.by_controller(cell, hand_eye));
+        let [Some(plain), Some(by_park)] = by_controller else { continue };
         // By corrected poses and commands.
-        let seen = cell.camera_at(&actual(&view.joints), &mount(&arm.hand_eye)) * in_camera;
+        let seen = cell.camera_at(&actual(&view.joints), arm.hand_eye.mount_from_camera().isometry()) * in_camera;
         let goal = Isometry3::from_parts(seen.coords.into(), down) * Translation3::from(-corrected_tool);
         let Ok(command) = corrected.command(&Pose::from_isometry(goal), &plain) else { continue };
         let off = [plain, command.joints_rad, by_park].map(|joints| cell.off(&joints, &truth, &mut rng));
@@ -143,6 +140,115 @@ pub struct Unknown {
 }
 
 const VERY_MANY: usize = 300;
+
+/// A session of which the joints are not known and the accuracy of the robot is.
+pub struct ByAccuracy {
+    /// Root mean square distance and angle between where the tip is and where it is reported, millimetres and degrees.
+    pub accuracy: [f64; 2],
+    /// Root mean square distance of touches, millimetres.
+    pub touch_mm: f64,
+    /// Stated of them, and which part of them is within.
+    pub stated_mm: f64,
+    pub within: f64,
+}
+
+pub fn by_accuracy(cell: &Cell, asked: Asked, seed: u64) -> Result<ByAccuracy, Failure> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let placed = Placed::of(cell)?;
+    let taken = cell.take(asked.views, &mut rng);
+    let accuracy = accuracy(cell, &cell.take(VERY_MANY, &mut rng)).ok_or("not aligned")?;
+    let (mut observations, _) = observed(cell, &placed, &taken, asked.free_lens);
+    observations.views.iter_mut().for_each(|view| view.tip_from_joints.clear());
+    let robot = RobotAccuracy { error_m: accuracy[0], tool_m: cell.tool.translation.vector.into() };
+    let wanted = FindingOptions::default().with_robot_accuracy(Some(robot));
+    let work = CancelToken::default();
+    let calibration = calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &work)?;
+    let hand_eye = calibration.hand_eye.ok_or("no answer")?;
+    let stated_m = calibration.reach_errors().ok_or("nothing stated")?.as_it_is_95_m;
+    let believed = |joints: &[f64]| cell.believed.forward(joints);
+    let tool = cell.tool_by(believed, &taken, &mut rng).ok_or("no tool")?;
+    let mut off = Vec::new();
+    for _ in 0..TRIES {
+        if off.len() == TOUCHES {
+            break;
+        }
+        let view = &taken[rng.random_range(0..taken.len())];
+        let (in_camera, truth) = cell.point(view, &mut rng);
+        let down = cell.down(&taken, &mut rng);
+        let touch = Touch { view, in_camera, down, tool };
+        let Some(joints) = touch.by_controller(cell, &hand_eye) else { continue };
+        off.push(cell.off(&joints, &truth, &mut rng));
+    }
+    if off.is_empty() {
+        return Err("the arm reaches none of the points".into());
+    }
+    let count = off.len() as f64;
+    Ok(ByAccuracy {
+        accuracy: [accuracy[0] * 1e3, accuracy[1].to_degrees()],
+        touch_mm: (off.iter().map(|off| off * off).sum::<f64>() / count).sqrt() * 1e3,
+        stated_mm: stated_m * 1e3,
+        within: off.iter().filter(|off| **off <= stated_m).count() as f64 / count,
+    })
+}
+
+/// Root mean square distance and angle between where the tip is and where it is reported, with base and tip where that is least: a
+/// hand-eye calibration takes up the rest. A turn counts as at 0.3 m.
+fn accuracy(cell: &Cell, taken: &[Taken]) -> Option<[f64; 2]> {
+    const LEVER_M: f64 = 0.3;
+    let rigid = |x: &DVector<f64>, at: usize| shift_and_turn(&x.fixed_rows::<6>(at).into_owned());
+    let misses = |x: &DVector<f64>| -> Vec<Vector6<f64>> {
+        let miss = |view: &Taken| {
+            between(&cell.real.tip(&view.joints), &(rigid(x, 0) * cell.believed.forward(&view.joints) * rigid(x, 6)))
+        };
+        taken.iter().map(miss).collect()
+    };
+    let scaled = |x: &DVector<f64>| {
+        DVector::from_iterator(
+            6 * taken.len(),
+            misses(x).iter().flat_map(|miss| {
+                let numbers: [f64; 6] = std::array::from_fn(|i| miss[i] * if i < 3 { 1.0 } else { LEVER_M });
+                numbers
+            }),
+        )
+    };
+    let mut x = DVector::zeros(12);
+    for _ in 0..8 {
+        let here = scaled(&x);
+        let columns: Vec<DVector<f64>> = (0..12)
+            .map(|k| {
+                let mut moved = x.clone();
+                moved[k] += 1e-6;
+                (scaled(&moved) - &here) / 1e-6
+            })
+            .collect();
+        let by = DMatrix::from_columns(&columns);
+        x -= (by.transpose() * &by).lu().solve(&(by.transpose() * here))?;
+    }
+    let mean_square = |at: usize| {
+        misses(&x).iter().map(|miss| miss.fixed_rows::<3>(at).norm_squared()).sum::<f64>() / taken.len() as f64
+    };
+    Some([mean_square(0).sqrt(), mean_square(3).sqrt()])
+}
+
+/// A point that was seen, and how it shall be touched.
+struct Touch<'a> {
+    view: &'a Taken,
+    in_camera: Point3<f64>,
+    down: UnitQuaternion<f64>,
+    /// The tip of the tool as it was found.
+    tool: Vector3<f64>,
+}
+
+impl Touch<'_> {
+    /// Joint values by the poses that the controller reports.
+    fn by_controller(&self, cell: &Cell, hand_eye: &HandEye) -> Option<Vec<f64>> {
+        let mounted = hand_eye.mount_from_camera();
+        let tip = cell.believed.forward(&self.view.joints);
+        let seen = cell.camera_at(&tip, mounted.isometry()) * self.in_camera;
+        let goal = Isometry3::from_parts(seen.coords.into(), self.down) * Translation3::from(-self.tool);
+        cell.believed_joints(&goal, &self.view.joints)
+    }
+}
 
 pub fn unknown(cell: &Cell, asked: Asked, seed: u64) -> Result<Unknown, Failure> {
     let Asked { views, free_lens, of_links, .. } = asked;

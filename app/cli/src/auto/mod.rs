@@ -26,8 +26,8 @@ use crate::auto::sequence::{Images, PoseSequence};
 use crate::cell_choice::CellChoice;
 use crate::open_cell::OpenCell;
 use crate::rerun_arg;
+use crate::robot_args::RobotArgs;
 use crate::solve::Wanted;
-use crate::tool_arg::ToolArg;
 use crate::towards_board::TowardsBoard;
 use crate::{Failure, RerunArg, arm_arg, box_arg, out, record, solve};
 use guided::GuidedSequence;
@@ -85,7 +85,7 @@ pub struct AutoArgs {
     #[arg(long, value_name = "N", default_value_t = CaptureOptions::default().frames, value_parser = clap::value_parser!(u32).range(1..=64), help_heading = heading::POSES)]
     frames: u32,
     #[command(flatten)]
-    tool: ToolArg,
+    robot: RobotArgs,
     #[command(flatten)]
     rerun: RerunArg,
 }
@@ -213,7 +213,8 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     let meta = SessionMeta {
         seeds: args.cell.seed.map(|seed| ("cell".to_owned(), seed)).into_iter().collect(),
         arm: start::arm(cell.kinematics()),
-        tool_m: args.tool.tool_m,
+        tool_m: args.robot.tool_m,
+        robot_accuracy_mm: args.robot.accuracy_mm,
         joint_kinds: start::joint_kinds(cell.facts.joints.iter().map(|joint| joint.kind)),
         target,
         mode: args.mode.unwrap_or(Mode::EyeInHand),
@@ -257,7 +258,8 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
 
     let goal_m = guide.as_ref().map_or(model::Goal::default().0, |guide| guide.options().goal_m);
     // The session has the tool.
-    let wanted = Wanted { method: Method::Joint, options: Options::default(), goal_m, tool_m: None };
+    let robot = RobotArgs::default();
+    let wanted = Wanted { method: Method::Joint, options: Options::default(), goal_m, robot };
     let mut solution = solve::folder(&folder, wanted, truth, &cancel)?;
     solution.guided_by(guide.as_ref().map(guided_record));
     finish(&session, args.json.as_ref(), &solution)?;

@@ -124,6 +124,12 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
             cx.model.notify(Severity::Error, text!("The connection could not be started: {error}", error = error));
         }
     }
+    if source != cx.model.source && !cx.model.document().captures.is_empty() {
+        cx.model.notify(
+            Severity::Warning,
+            text!("If this is another cell than that of the captures, begin a new session (Ctrl+N): captures of two cells do not calibrate together"),
+        );
+    }
     cx.model.source = source;
     cx.model.capture = None;
     cx.model.track.board = BoardMotion::default();

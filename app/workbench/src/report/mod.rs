@@ -110,7 +110,8 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
 fn reach(result: &CalibrationResult) -> Option<String> {
     let Some(plain) = result.quality.reach_error_95_mm else {
         let is_asked = result.mode.is_some() && result.quality.tip_error_95_mm.is_some() && result.arm.is_none();
-        let why = "without the errors of the arm, which take its kinematics and the joint values of every capture";
+        let why = "without the errors of the arm, which take its kinematics and the joint values of every capture, or the accuracy of the \
+                   robot (--robot-accuracy)";
         return is_asked.then(|| format!("how near a tool arrives is not known {why}"));
     };
     let length = result.arm.as_ref().map(|arm| format!(" of {:.0} mm", Vector3::from(arm.tool_m).norm() * 1e3));
@@ -118,9 +119,12 @@ fn reach(result: &CalibrationResult) -> Option<String> {
         "a tool{} arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is",
         length.unwrap_or_default()
     );
-    Some(match result.quality.reach_error_corrected_95_mm {
-        Some(corrected) => format!("{stated}, within {corrected:.3} mm with corrected commands (`handeye correct`)"),
-        None => stated,
+    Some(match (result.quality.reach_error_corrected_95_mm, result.quality.robot_accuracy_mm) {
+        (Some(corrected), _) => {
+            format!("{stated}, within {corrected:.3} mm with corrected commands (`handeye correct`)")
+        }
+        (None, Some(accuracy)) => format!("{stated}, with the robot accurate to {accuracy} mm RMS as stated"),
+        (None, None) => stated,
     })
 }
 

@@ -57,6 +57,8 @@ pub enum Command {
     SetMode(Mode),
     /// What is known of the camera.
     SetCamera(Option<CameraInput>),
+    /// The robot is known to be so accurate, millimetres RMS; `None` where that is not known.
+    SetRobotAccuracy(Option<f64>),
 }
 
 /// What has happened to the session.

@@ -46,6 +46,7 @@ fn name_of(edit: &Edit) -> Text {
         Edit::SetTarget(_) => text!("change of the target"),
         Edit::SetMode(_) => text!("change of where the camera sits"),
         Edit::SetCamera(_) => text!("change of what is known of the camera"),
+        Edit::SetRobotAccuracy(_) => text!("change of the accuracy of the robot"),
         Edit::SetTaught { .. } => text!("change of the taught poses"),
         Edit::SetExportNames(_) => text!("change of the names in exports"),
     }

@@ -51,5 +51,6 @@ pub fn meta(truth: Option<&Truth>, created: String) -> SessionMeta {
         arm: None,
         joint_kinds: None,
         tool_m: None,
+        robot_accuracy_mm: None,
     }
 }

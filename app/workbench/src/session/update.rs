@@ -48,6 +48,7 @@ pub(crate) fn apply(
         Command::Delete(ids) => delete(model, desk, ids),
         Command::SetMode(mode) => set_mode(model, workers, desk, mode),
         Command::SetCamera(camera) => edit(model, desk, Edit::SetCamera(camera)),
+        Command::SetRobotAccuracy(mm) => edit(model, desk, Edit::SetRobotAccuracy(mm)),
     }
 }
 

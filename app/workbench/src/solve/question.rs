@@ -9,6 +9,7 @@ use crate::model::Goal;
 pub(crate) struct Question {
     pub meta:
         (handeye_estimate::handeye::Mode, handeye_geometry::targets::TargetSpec, Option<handeye_dataset::CameraInput>),
+    pub robot_accuracy_mm: Option<f64>,
     pub captures: Vec<(CaptureId, Role, bool, bool)>,
     pub folder: Option<std::path::PathBuf>,
     pub method: String,

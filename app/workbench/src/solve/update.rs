@@ -47,6 +47,7 @@ fn question(model: &Model) -> Question {
     let document = model.document();
     Question {
         meta: (document.meta.mode, document.meta.target, document.meta.camera),
+        robot_accuracy_mm: document.meta.robot_accuracy_mm,
         captures: document
             .captures
             .iter()
@@ -136,7 +137,7 @@ pub(crate) fn is_asked(model: &Model, numbers: &Numbers) -> bool {
 }
 
 fn job(model: &Model, id: JobId, document: &Document) -> SolveJob {
-    let SessionObservations { observations, captures, verification, arm } = seen(model, document);
+    let SessionObservations { observations, captures, verification, arm, robot_accuracy } = seen(model, document);
     SolveJob {
         id,
         observations,
@@ -146,6 +147,7 @@ fn job(model: &Model, id: JobId, document: &Document) -> SolveJob {
         options: Options { keep_outliers: model.keep_outliers, ..Options::default() },
         goal_m: model.view.goal.0,
         arm,
+        robot_accuracy,
         truth: model.cell.as_ref().and_then(|cell| cell.truth.clone()),
     }
 }

@@ -8,6 +8,7 @@ use handeye_estimate::diagnose::examine;
 use handeye_estimate::diagnose::findings::{Finding, FindingOptions, depth_finding, sort};
 use handeye_estimate::handeye::HandEyeError;
 use handeye_estimate::placement::ArmOfViews;
+use handeye_estimate::robot_accuracy::RobotAccuracy;
 use handeye_estimate::verify::{self, DepthCheck, DepthReport, Predictor, Verification};
 use handeye_estimate::{self as estimate, CalibrateError, Fit, Method, Observations, Options, ViewStatus};
 use handeye_geometry::progress::{CancelToken, Progress, Work};
@@ -44,6 +45,8 @@ pub struct SolveJob {
     pub goal_m: f64,
     /// The arm, where the views know its joints.
     pub arm: Option<ArmOfViews>,
+    /// How accurate the robot is, where something was said of it.
+    pub robot_accuracy: Option<RobotAccuracy>,
     /// For comparison with the answer, when that is there.
     pub truth: Option<Truth>,
 }
@@ -91,6 +94,7 @@ pub fn answer(job: &SolveJob, work: Work<'_>) -> Result<Solved, CalibrateError> 
 /// When the work was cancelled.
 pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, CalibrateError> {
     let goal = FindingOptions::with_goal_mm(Some(job.goal_m * 1e3)).with_arm(job.arm.as_ref());
+    let goal = goal.with_robot_accuracy(job.robot_accuracy);
     let calibration = examine(&job.observations, fit, &goal, work.cancel)?;
     let mut findings = calibration.diagnosis().findings.clone();
     let options = solve_options(job.method, job.options, &job.observations.target);
@@ -213,6 +217,7 @@ mod tests {
             options: Options::default(),
             goal_m: 5e-4,
             arm: None,
+            robot_accuracy: None,
             truth: None,
         };
         let cancel = CancelToken::default();
@@ -252,6 +257,7 @@ mod tests {
             options: Options::default(),
             goal_m: 5e-4,
             arm: None,
+            robot_accuracy: None,
             truth: None,
         };
         let off_m = |job: &SolveJob| {

@@ -34,6 +34,7 @@ use super::findings::FindingOptions;
 use crate::handeye::HandEyeError;
 use crate::handeye::joint::SmallSample;
 use crate::reach_error::{Reach, ReachErrors};
+use crate::robot_accuracy::ReachByAccuracy;
 use crate::stated_uncertainty::{Alternative, StatedUncertainty};
 use crate::{self as estimate, CalibrateError, Fit, LinkCovariances, Method, Observations, Options, resolution};
 use handeye_geometry::point_error;
@@ -45,7 +46,9 @@ pub struct Calibration {
     pub(super) fit: Fit,
     pub(super) stated: StatedUncertainty,
     pub(super) reach: Option<Reach>,
-    /// Of that, at the target: it is asked for often.
+    /// Where that is not known and the accuracy of the robot is.
+    pub(super) reach_by_accuracy: Option<ReachByAccuracy>,
+    /// Of either, at the target: it is asked for often.
     pub(super) reach_at_target: Option<ReachErrors>,
     pub(super) diagnosis: Diagnosis,
 }
@@ -215,7 +218,8 @@ mod made_up {
         /// As if nothing had been found.
         pub fn as_modelled(fit: Fit) -> Self {
             let stated = StatedUncertainty::AsModelled;
-            Self { fit, stated, reach: None, reach_at_target: None, diagnosis: Diagnosis::default() }
+            let diagnosis = Diagnosis::default();
+            Self { fit, stated, reach: None, reach_by_accuracy: None, reach_at_target: None, diagnosis }
         }
 
         /// With another error that may be stated.

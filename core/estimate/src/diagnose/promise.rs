@@ -6,6 +6,7 @@ use super::Calibration;
 use crate::corrected_arm::CorrectedArm;
 use crate::placement::ArmOfViews;
 use crate::reach_error::{Reach, ReachErrors, Seen};
+use crate::robot_accuracy::{ReachByAccuracy, RobotAccuracy};
 use crate::uncertainty::quality::TipBox;
 use crate::{Fit, ViewStatus};
 use handeye_geometry::targets::TargetSpec;
@@ -49,12 +50,11 @@ impl Promised {
 }
 
 impl Calibration {
-    /// How near a tool arrives, at points of the target where it was seen; `None` where the arm is not known, where views left out
-    /// contradict its errors, and where no error may be stated.
+    /// How near a tool arrives, at points of the target where it was seen; `None` where neither the arm is known nor how accurate the robot
+    /// is, and where no error may be stated. An arm whose errors are contradicted by views left out is not known.
     ///
     /// What was found and the answer does not count on adds how far it would move the answer.
     pub fn reach_errors(&self) -> Option<ReachErrors> {
-        self.reach.as_ref()?;
         let at = self.joint.as_ref()?.reference_point;
         Some(self.reach_at_target?.moved_by(self.stated.moved_m(&at)))
     }
@@ -68,7 +68,13 @@ impl Calibration {
 
     /// Length of the tool of [`Self::reach_errors`], metres.
     pub fn tool_length_m(&self) -> Option<f64> {
-        self.reach.as_ref().map(Reach::tool_length_m)
+        let by_accuracy = self.robot_accuracy().map(|accuracy| Vector3::from(accuracy.tool_m).norm());
+        self.reach.as_ref().map(Reach::tool_length_m).or(by_accuracy)
+    }
+
+    /// What was said of the robot, where [`Self::reach_errors`] counts on it: with joints that are known these say more.
+    pub fn robot_accuracy(&self) -> Option<&RobotAccuracy> {
+        self.reach_by_accuracy.as_ref().map(ReachByAccuracy::accuracy)
     }
 
     /// The error that a goal \[m\] is asked of, see [`Promised::of`]. In a box that of its worst point: of a tool with a camera beside the
@@ -76,7 +82,7 @@ impl Calibration {
     pub fn promised(&self, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Promised> {
         let reach = match tool_box {
             None => self.reach_errors(),
-            Some(tool_box) if self.reach.as_ref().is_some_and(Reach::stands_still) => Some(self.reach_in(tool_box)?),
+            Some(tool_box) if self.reaches_beside() => Some(self.reach_in(tool_box)?),
             Some(_) => None,
         };
         let point_m = match tool_box {
@@ -91,7 +97,7 @@ impl Calibration {
         let least_m = reach.map_or(0.0, |reach| match promised.of {
             Promise::Point => 0.0,
             Promise::Reach => reach.as_it_is_least_95_m,
-            Promise::ReachCorrected => reach.repeatability_95_m,
+            Promise::ReachCorrected => reach.repeatability_95_m.unwrap_or(0.0),
         });
         Some(Promised { least_m, ..promised })
     }
@@ -105,10 +111,20 @@ impl Calibration {
         reach.weight(points.as_ref().map(|points| &points[..]))
     }
 
+    /// Whether it is known how near a tool arrives at points of a camera beside the arm.
+    fn reaches_beside(&self) -> bool {
+        let stands_still = |by_accuracy: &ReachByAccuracy| by_accuracy.stands_still();
+        self.reach.as_ref().map_or(self.reach_by_accuracy.as_ref().is_some_and(stands_still), Reach::stands_still)
+    }
+
     fn reach_in(&self, tool_box: &TipBox) -> Option<ReachErrors> {
         let points = tool_box.corners_and_middle();
         let moved_m = points.iter().map(|point| self.stated.moved_m(point)).fold(0.0, f64::max);
-        Some(self.reach.as_ref()?.at_points(&points)?.moved_by(moved_m))
+        let errors = match (&self.reach, &self.reach_by_accuracy) {
+            (Some(reach), _) => reach.at_points(&points),
+            (None, by_accuracy) => by_accuracy.as_ref()?.at_points(&points),
+        };
+        Some(errors?.moved_by(moved_m))
     }
 }
 
@@ -124,6 +140,20 @@ pub(super) fn reach(fit: &Fit, of_views: &ArmOfViews, target: &TargetSpec) -> Op
     let is_its_own = placement.arm_of_poses().is_some();
     let tool = Vector3::from(of_views.tool_m);
     Reach::new((&arm, errors), fit.hand_eye.as_ref()?, seen.collect(), target, &tool, is_its_own)
+}
+
+/// The robot of a calibration of which no more is known than how accurate it is; `None` where that gives no error of reach.
+pub(super) fn reach_by_accuracy(
+    calibration: &Calibration,
+    accuracy: &RobotAccuracy,
+    target: &TargetSpec,
+) -> Option<ReachByAccuracy> {
+    let joint = calibration.joint.as_ref()?;
+    let of_hand_eye = (calibration.hand_eye.as_ref()?, calibration.hand_eye_covariance()?, joint.small_sample);
+    let used = calibration.views.iter().filter(|view| view.status == ViewStatus::Used);
+    let views = used.filter_map(|view| view.camera_from_target).collect();
+    let noise = [joint.noise.robot_m, joint.noise.robot_rad];
+    ReachByAccuracy::new(accuracy, noise, of_hand_eye, views, target)
 }
 
 #[cfg(test)]

@@ -35,6 +35,7 @@ def calibrate(
     names: Optional[Sequence[str]] = None,
     joints: Any = None,
     arm: Any = None,
+    robot_accuracy_mm: Optional[float] = None,
     method: str = "joint",
     keep_outliers: bool = False,
     free_scale: bool = False,
@@ -50,7 +51,7 @@ def calibrate(
     Parameters
     ----------
     dataset
-        A data set; everything up to `arm` is then left out.
+        A data set; everything up to `robot_accuracy_mm` is then left out.
     corners
         For each of N views (M, 2) pixels u, v, or None where the target was not found. (0, 0) is the centre of the top-left
         pixel, as OpenCV has it; (M, 1, 2), which OpenCV's detectors answer, is taken too.
@@ -86,6 +87,9 @@ def calibrate(
         Which arm it is: the name of one that is built in, such as "ur5e"; rows of Denavit and Hartenberg (n, 4) of a, alpha, d,
         theta, metres and radians; or the path of a URDF file, where that leaves a choice as (path, base link, tip link). Where
         it stands and what its tool is follow from the poses.
+    robot_accuracy_mm
+        How far the tip is from where the robot reports it, millimetres RMS over the region where it works, such as its maker states.
+        Where the arm is not given, `Calibration.reach_error_95_mm` follows from it.
     method
         joint, or one closed form: tsai_lenz, park_martin, horaud, andreff, daniilidis, shah, li.
     keep_outliers
@@ -117,7 +121,7 @@ def calibrate(
     """
     observations = _observations(
         dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics,
-        intrinsics_accuracy_px, intrinsics_start, lens_model, mode, names, joints, arm,
+        intrinsics_accuracy_px, intrinsics_start, lens_model, mode, names, joints, arm, robot_accuracy_mm,
     )
     if dataset is not None:
         _warn_of_unused(observations.joints_unused)
@@ -150,6 +154,7 @@ def doctor(
     names: Optional[Sequence[str]] = None,
     joints: Any = None,
     arm: Any = None,
+    robot_accuracy_mm: Optional[float] = None,
     goal_mm: Optional[float] = None,
     progress: Optional[Progress] = None,
 ) -> Diagnosis:
@@ -175,7 +180,7 @@ def doctor(
     """
     observations = _observations(
         dataset, corners, corner_ids, target, base_from_tip, camera_from_target, image_size, intrinsics,
-        intrinsics_accuracy_px, intrinsics_start, lens_model, mode, names, joints, arm,
+        intrinsics_accuracy_px, intrinsics_start, lens_model, mode, names, joints, arm, robot_accuracy_mm,
     )
     _warn_of_unused(observations.joints_unused)
     return Diagnosis._of(*_handeye.diagnose(observations, goal_mm, progress))
@@ -202,6 +207,7 @@ def _observations(
     names: Optional[Sequence[str]],
     joints: Any,
     arm: Any,
+    robot_accuracy_mm: Optional[float],
 ) -> Any:
     if dataset is not None:
         rest = {
@@ -209,6 +215,7 @@ def _observations(
             "camera_from_target": camera_from_target, "image_size": image_size, "intrinsics": intrinsics,
             "intrinsics_accuracy_px": intrinsics_accuracy_px, "intrinsics_start": intrinsics_start, "lens_model": lens_model,
             "mode": mode, "names": names, "joints": joints, "arm": arm,
+            "robot_accuracy_mm": robot_accuracy_mm,
         }
         given = [name for name, value in rest.items() if value is not None]
         if not isinstance(dataset, Dataset):
@@ -240,6 +247,10 @@ def _observations(
             raise InputError(
                 "intrinsics_accuracy_px is a number of pixels between 0.001 and 1000, and goes with corners and intrinsics"
             )
+    if robot_accuracy_mm is not None:
+        robot_accuracy_mm = float(robot_accuracy_mm)
+        if base_from_tip is None or not 1e-3 <= robot_accuracy_mm <= 100.0:
+            raise InputError("robot_accuracy_mm is a number of millimetres between 0.001 and 100, and goes with base_from_tip")
     if (joints is None) != (arm is None):
         given, missing = ("joints", "arm") if arm is None else ("arm", "joints")
         raise InputError(
@@ -277,6 +288,7 @@ def _observations(
         "model": lens_model,
         "names": [str(n) for n in names] if names is not None else [f"view {i}" for i in range(max(counts.values()))],
         "arm": None if arm is None else described_arm(arm),
+        "robot_accuracy_mm": robot_accuracy_mm,
     }
     return _handeye.Observations(
         json.dumps(described), None if robot is None else packed(robot), found, None if seen is None else packed(seen),

@@ -46,6 +46,8 @@ class Dataset:
     """(M,) which points of the target they are."""
     joints: Optional[List[Optional[Array]]]
     """Joint values of each view, radians or metres; None when the pose table has none."""
+    robot_accuracy_mm: Optional[float]
+    """How accurate the robot is, millimetres RMS; None where nothing is said of it."""
     notes: List[str]
     """What the tables name outside of the folder."""
     _observations: Any = field(repr=False)
@@ -103,6 +105,7 @@ def load_dataset(path: Union[str, "os.PathLike[str]"]) -> Dataset:
         corners=corners,
         corner_ids=corner_ids,
         joints=joints,
+        robot_accuracy_mm=said["robot_accuracy_mm"],
         notes=said["notes"],
         _observations=observations,
     )

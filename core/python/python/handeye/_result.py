@@ -60,6 +60,12 @@ class Calibration:
     tip_error_95_mm: Optional[float]
     """Expected error of a point that is measured where the camera saw the target: 95 % of errors are below, millimetres.
     None for pose pairs (nothing says where points are measured) and where a finding is a problem."""
+    reach_error_95_mm: Optional[float]
+    """How far from a point that the camera saw the tip of a tool arrives by the controller as it is: 95 % are below, millimetres. By the
+    errors of the arm, or where it is not given by the accuracy of the robot; None where neither is known. With an arm,
+    `Calibration.arm` has it by corrected commands too."""
+    robot_accuracy_mm: Optional[float]
+    """The stated accuracy of the robot that it follows from; None otherwise."""
     rms_px: Optional[float]
     """Root mean square residual of the corners. How well the model fits, not how accurate it is."""
     heldout_rms_px: Optional[float]
@@ -164,6 +170,8 @@ class Calibration:
             hand_eye_covariance=covariances.get("hand_eye"),
             target_covariance=covariances.get("target"),
             tip_error_95_mm=quality["tip_error_95_mm"],
+            reach_error_95_mm=quality.get("reach_error_95_mm"),
+            robot_accuracy_mm=quality.get("robot_accuracy_mm"),
             rms_px=quality["rms_px"],
             heldout_rms_px=quality["heldout_rms_px"],
             corner_sigma_px=quality["sigma_px"],

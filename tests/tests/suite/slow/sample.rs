@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use handeye_coppeliasim::cell::{CellClient, CellPaths};
 use handeye_coppeliasim::{ConnectionOptions, Endpoint};
@@ -11,7 +12,7 @@ use handeye_geometry::se3;
 use handeye_result::{CalibrationResult, TransformEstimate};
 use handeye_tests::workbench::Workbench;
 use handeye_tests::{CellProcess, workspace_root};
-use handeye_workbench::model::CellSource;
+use handeye_workbench::model::{CellSource, Solved};
 use handeye_workbench::session;
 use image::codecs::jpeg::JpegEncoder;
 
@@ -133,6 +134,54 @@ fn the_sample_is_opened_as_a_session_of_its_own_and_solved() {
         assert!(bench.model().session.folder.as_ref().is_some_and(|folder| folder.starts_with(&sessions)));
         assert_true(&bench.model().solve.current().expect("solved").result);
     }
+}
+
+/// Said on the command line, in the data set and in the window it is the same.
+#[test]
+fn the_accuracy_of_the_robot_says_how_near_a_tool_arrives() {
+    let calibrated = |folder: &Path, options: &[&str]| {
+        let output = handeye(&[&["calibrate", utf8(folder), "--json", "-"], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        CalibrationResult::from_json(&text(&output.stdout)).expect("a result").quality
+    };
+    let unknown = calibrated(&sample(), &[]);
+    assert_eq!((unknown.reach_error_95_mm, unknown.robot_accuracy_mm), (None, None));
+    let said = calibrated(&sample(), &["--robot-accuracy", "0.5"]);
+    assert_eq!(said.robot_accuracy_mm, Some(0.5));
+    assert_eq!(said.tip_error_95_mm, unknown.tip_error_95_mm, "the camera's part alone");
+    let reach_mm = said.reach_error_95_mm.expect("it follows from the accuracy");
+    assert!((0.5..5.0).contains(&reach_mm), "{reach_mm} mm");
+    assert_eq!(said.reach_error_corrected_95_mm, None, "no errors are known to correct");
+    let longer = calibrated(&sample(), &["--robot-accuracy", "0.5", "--tool", "0,0,0.3"]);
+    assert!(longer.reach_error_95_mm > Some(reach_mm), "{longer:?}");
+
+    let home = tempfile::tempdir().expect("a folder");
+    let folder = home.path().join("my_robot_images");
+    let written = handeye(&["sample", "--out", utf8(&folder)]);
+    assert_eq!(written.status.code(), Some(0), "{}", text(&written.stderr));
+    let description = fs::read_to_string(folder.join("dataset.toml")).expect("written");
+    fs::write(folder.join("dataset.toml"), description.replace("[robot]", "[robot]\naccuracy_mm = 0.5"))
+        .expect("written");
+    assert_eq!(calibrated(&folder, &[]), said);
+
+    let nothing = CellSource::Address("tcp://127.0.0.1:1".to_owned());
+    let mut bench = Workbench::start(nothing, &home.path().join("sessions"), None);
+    bench.click(session::Command::OpenSample);
+    let solved = |bench: &mut Workbench, accuracy_mm| {
+        bench.until("an answer with this accuracy", |model| {
+            let is_there = |solved: &Arc<Solved>| solved.result.quality.robot_accuracy_mm == accuracy_mm;
+            model.solve.fresh && model.solve.current().is_some_and(is_there)
+        });
+        bench.model().solve.current().expect("solved").result.quality
+    };
+    assert_eq!(solved(&mut bench, None).reach_error_95_mm, None);
+    bench.click(session::Command::SetRobotAccuracy(Some(0.5)));
+    let shown_mm = solved(&mut bench, Some(0.5)).reach_error_95_mm.expect("as on the command line");
+    assert!((shown_mm - reach_mm).abs() < 1e-9, "{shown_mm} mm, {reach_mm} mm");
+    let folder = bench.model().session.folder.clone().expect("a session");
+    assert_eq!(calibrated(&folder, &[]).robot_accuracy_mm, Some(0.5), "it is kept");
+    bench.click(session::Command::Undo);
+    assert_eq!(solved(&mut bench, None).reach_error_95_mm, None);
 }
 
 /// A small recording that everybody downloads.

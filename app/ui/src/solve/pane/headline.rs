@@ -2,6 +2,7 @@
 
 use handeye_estimate::diagnose::{Promise, Promised};
 use handeye_estimate::reach_error::USUAL_TOOL_M;
+use handeye_estimate::robot_accuracy::ROBOT_ACCURACY_MM;
 
 use egui::{Align, CornerRadius, DragValue, Frame, Label, Layout, Margin, RichText, Stroke, Ui};
 
@@ -10,9 +11,9 @@ use handeye_wording::text;
 use handeye_workbench::command::Outbox;
 use handeye_workbench::model::{Model, Solved};
 use handeye_workbench::report::in_parts;
-use handeye_workbench::solve;
 use handeye_workbench::text::Language;
 use handeye_workbench::tr;
+use handeye_workbench::{session, solve};
 
 /// Size of the number.
 const FIGURE: f32 = 28.0;
@@ -59,7 +60,7 @@ fn verdict_ui(ui: &mut Ui, model: &Model, solved: &Solved, promised: &Promised, 
     };
     let palette = Palette::of(ui);
     ui.add(Label::new(RichText::new(verdict).color(palette.tone(tone))).wrap());
-    let repeats = solved.calibration.reach_errors().map(|reach| reach.repeatability_95_m);
+    let repeats = solved.calibration.reach_errors().and_then(|reach| reach.repeatability_95_m);
     let limit = repeats.filter(|repeats| !is_reached && promised.of != Promise::Point && *repeats > model.view.goal.0);
     if let Some(limit_m) = limit {
         let words = text!(
@@ -96,9 +97,11 @@ fn expected_error_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut O
     if error_mm.is_some() && solved.result.mode.is_some() && solved.result.arm.is_none() {
         let reach = tr!(
             language,
-            "How near a tool arrives is not known without the errors of the arm, which take its kinematics and the joint values of every capture."
+            "How near a tool arrives is not known without the errors of the arm, which take its kinematics and the joint values of every \
+             capture, or the accuracy of the robot."
         );
         ui.add(Label::new(RichText::new(reach).color(palette.text)).wrap());
+        robot_accuracy_ui(ui, model, outbox);
     }
     moved_ui(ui, model, solved, error_mm);
 }
@@ -162,7 +165,46 @@ fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) ->
         tool = format!("{:.0}", tool * 1e3)
     );
     ui.add(Label::new(RichText::new(meaning.in_language(language)).color(palette.weak)).wrap());
+    if quality.robot_accuracy_mm.is_some() {
+        robot_accuracy_ui(ui, model, outbox);
+    }
     true
+}
+
+/// How accurate the robot is said to be, to say and to change.
+fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
+    let language = model.view.language;
+    let said_mm = model.document().meta.robot_accuracy_mm;
+    let mut accuracy_mm = said_mm.unwrap_or(0.0);
+    ui.horizontal_wrapped(|ui| {
+        let name = ui.label(tr!(language, "Accuracy of the robot"));
+        let meaning = tr!(
+            language,
+            "How far the TCP is from where the robot reports it, RMS over the region where it works, such as its maker states. At 0 it is \
+             not known."
+        );
+        let unknown = tr!(language, "not known");
+        let shown = move |mm: f64, _| if mm > 0.0 { format!("{mm} mm") } else { unknown.to_owned() };
+        let field = DragValue::new(&mut accuracy_mm)
+            .range(0.0..=*ROBOT_ACCURACY_MM.end())
+            .speed(0.01)
+            .max_decimals(3)
+            .custom_formatter(shown)
+            .custom_parser(millimetres)
+            .update_while_editing(false);
+        let response = ui.add(field).labelled_by(name.id).on_hover_text(meaning);
+        if response.changed() {
+            let known = Some(accuracy_mm).filter(|mm| mm >= ROBOT_ACCURACY_MM.start());
+            if known != said_mm {
+                outbox.send(session::Command::SetRobotAccuracy(known));
+            }
+        }
+    });
+}
+
+/// A length with or without its unit.
+fn millimetres(text: &str) -> Option<f64> {
+    text.trim().trim_end_matches("mm").trim().parse().ok()
 }
 
 fn goal_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {

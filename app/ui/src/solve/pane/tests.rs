@@ -16,7 +16,7 @@ use super::*;
 use crate::testing::driven::Driven;
 use handeye_workbench::command::Command;
 use handeye_workbench::model::{Goal, JobId, SolveStatus};
-use handeye_workbench::session::start::BOARD;
+use handeye_workbench::session::{self, start::BOARD};
 use handeye_workbench::solve;
 use handeye_workbench::testing::sample;
 use handeye_workbench::text::{Language, Text};
@@ -80,6 +80,31 @@ fn what_a_tool_arrives_within_is_said_and_that_the_arm_is_the_limit_where_it_is(
     assert!(pane.sees("2.91 mm") && !pane.sees("with corrected commands"), "its controller has another chain");
     let pane = with(None, None);
     assert!(!pane.sees("A tool arrives") && pane.sees("1.234 mm"), "an arm that is not known promises nothing");
+}
+
+#[test]
+fn the_accuracy_of_a_robot_is_asked_for_where_its_arm_is_not_known() {
+    const FIELD: &str = "Accuracy of the robot";
+    let mut pane = driven(sample::with_answer(|solved| solved.result.quality.tip_error_95_mm = Some(0.2)));
+    assert!(pane.sees("How near a tool arrives is not known") && pane.sees(FIELD));
+    pane.type_into(FIELD, "0.5 mm");
+    let sent = pane.press(egui::Key::Enter);
+    let wanted = session::Command::SetRobotAccuracy(Some(0.5));
+    assert_eq!(sent.last(), Some(&Command::Session(wanted)));
+    let by_accuracy = |mm: Option<f64>| {
+        let mut model = sample::with_answer(|solved| {
+            solved.result.quality.reach_error_95_mm = Some(1.8);
+            solved.result.quality.robot_accuracy_mm = mm;
+        });
+        Arc::make_mut(&mut model.session.document).meta.robot_accuracy_mm = mm;
+        driven(model)
+    };
+    let mut pane = by_accuracy(Some(0.5));
+    assert!(pane.sees("1.80 mm") && pane.sees(FIELD), "what it follows from can be changed");
+    pane.type_into(FIELD, "0");
+    let sent = pane.press(egui::Key::Enter);
+    assert_eq!(sent.last(), Some(&Command::Session(session::Command::SetRobotAccuracy(None))), "nothing is not known");
+    assert!(!by_accuracy(None).sees(FIELD), "the errors of its arm say more");
 }
 
 #[test]

@@ -95,6 +95,7 @@ impl Archive {
         meta.camera = dataset.camera;
         meta.arm = dataset.arm.as_ref().map(|arm| arm.model.clone());
         meta.tool_m = dataset.tool_m;
+        meta.robot_accuracy_mm = dataset.robot_accuracy_mm;
         if let Some(mode) = dataset.mode {
             meta.mode = mode;
         }

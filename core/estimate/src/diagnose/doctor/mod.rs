@@ -39,6 +39,7 @@ use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOpt
 use crate::diagnose::hypotheses::NEED;
 use crate::diagnose::promise;
 use crate::reach_error::Reach;
+use crate::robot_accuracy::ReachByAccuracy;
 use crate::stated_uncertainty::StatedUncertainty;
 use crate::{Fit, Observations};
 use handeye_geometry::progress::Work;
@@ -163,7 +164,14 @@ pub(super) fn examined(
     let reach = options.arm.filter(|_| stated != StatedUncertainty::Nothing);
     let reach = reach.and_then(|arm| promise::reach(&fit, arm, &observations.target));
     let reach_at_target = reach.as_ref().and_then(Reach::at_target);
-    let calibration = Calibration { fit, stated, reach, reach_at_target, diagnosis: Diagnosis::default() };
+    let mut calibration =
+        Calibration { fit, stated, reach, reach_by_accuracy: None, reach_at_target, diagnosis: Diagnosis::default() };
+    if let (Some(accuracy), None) = (options.robot_accuracy, calibration.reach_at_target)
+        && calibration.stated != StatedUncertainty::Nothing
+    {
+        calibration.reach_by_accuracy = promise::reach_by_accuracy(&calibration, &accuracy, &observations.target);
+        calibration.reach_at_target = calibration.reach_by_accuracy.as_ref().and_then(ReachByAccuracy::at_target);
+    }
     // After the claim: the goal is judged by it.
     let of_estimate = findings::findings(observations, Some(&calibration), options);
     Calibration { diagnosis: diagnosis.with(of_estimate), ..calibration }

@@ -388,8 +388,8 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let finding = finding.with("goal", goal_mm, "mm");
     let numbers = calibration.reach_errors().into_iter().flat_map(|reach| {
         let corrected = reach.corrected_95_m.map(|metres| ("reach_error_corrected_95", metres));
-        let repeatability = ("repeatability_95", reach.repeatability_95_m);
-        [Some(("reach_error_95", reach.as_it_is_95_m)), corrected, Some(repeatability)]
+        let repeatability = reach.repeatability_95_m.map(|metres| ("repeatability_95", metres));
+        [Some(("reach_error_95", reach.as_it_is_95_m)), corrected, repeatability]
     });
     let finding = numbers.flatten().fold(finding, |finding, (name, metres)| finding.with(name, metres * 1e3, "mm"));
     Some(advised.into_iter().fold(finding, |finding, (name, value, unit)| finding.with(name, value, unit)))

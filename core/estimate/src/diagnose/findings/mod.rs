@@ -24,6 +24,7 @@ use serde::Serialize;
 use crate::Observations;
 use crate::diagnose::Calibration;
 use crate::placement::ArmOfViews;
+use crate::robot_accuracy::RobotAccuracy;
 
 /// One number that supports a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -44,18 +45,26 @@ pub struct FindingOptions<'a> {
     pub goal_mm: Option<f64>,
     /// The arm, its tool and its joints in the views; `None` where its chain is not known.
     pub arm: Option<&'a ArmOfViews>,
+    /// How accurate the robot is, and its tool: counts where its chain is not known.
+    pub robot_accuracy: Option<RobotAccuracy>,
 }
 
 impl<'a> FindingOptions<'a> {
     /// With an error to reach (95 %), millimetres; `None` for no goal.
     pub const fn with_goal_mm(goal_mm: Option<f64>) -> Self {
-        Self { goal_mm, arm: None }
+        Self { goal_mm, arm: None, robot_accuracy: None }
     }
 
     /// With the arm of the views of the calibration, for the errors that a tool arrives within.
     #[must_use]
     pub const fn with_arm(self, arm: Option<&'a ArmOfViews>) -> Self {
         Self { arm, ..self }
+    }
+
+    /// With the accuracy of the robot, for the error that a tool arrives within where its chain is not known.
+    #[must_use]
+    pub const fn with_robot_accuracy(self, robot_accuracy: Option<RobotAccuracy>) -> Self {
+        Self { robot_accuracy, ..self }
     }
 }
 

@@ -39,6 +39,7 @@ fn meta() -> SessionMeta {
         arm: None,
         joint_kinds: None,
         tool_m: None,
+        robot_accuracy_mm: None,
     }
 }
 

@@ -1,0 +1,206 @@
+//! How near a tool arrives at a point that the camera saw, where of the arm no more is known than how accurate it is.
+//!
+//! # What it estimates
+//! The distance of [`reach_error`](crate::reach_error) by the controller as it is, for an arm whose joints or chain are not known.
+//!
+//! # Model
+//! Where the tip really is differs from where the robot reports it by a shift and a turn, normal and alike in all directions, with
+//! the stated accuracy as the root mean square of the shift. At the view, at the touch and at each turn by which the tool is found
+//! they are drawn anew: what an arm is off in a whole region alike is counted as if it were not, so that what is stated is rather too
+//! much. What the views show of the robot's noise is counted where it is more than what was stated.
+//!
+//! Makers state no accuracy of rotations. It is counted as [`TURN_PER_M`] says, which is what arms have.
+//!
+//! # Reference
+//! ISO 9283 (pose accuracy); the 17 factory calibrations of `tests/studies/arm_errors`.
+
+use std::ops::RangeInclusive;
+
+use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use crate::handeye::draw::Draw;
+use crate::handeye::joint::SmallSample;
+use crate::handeye::{HandEye, Mode};
+use crate::reach_error::{APART, DRAWS, Plan, ReachErrors, SEED, USUAL_TOOL, camera, facing, planned, quantile, turns};
+use handeye_geometry::frames::{Camera, Pose, Target};
+use handeye_geometry::targets::TargetSpec;
+
+/// Turn of the tip in radians for each metre that it is off, root mean square each.
+pub const TURN_PER_M: f64 = 6.0;
+
+/// Accuracies that a robot may be given, millimetres.
+pub const ROBOT_ACCURACY_MM: RangeInclusive<f64> = 0.001..=100.0;
+
+/// What is known of a robot beforehand, and the tool that it shall bring somewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotAccuracy {
+    /// Distance between where the tip is and where the robot reports it, root mean square over the region in which it works, metres.
+    pub error_m: f64,
+    /// Where the tip of its tool is in the frame of the tip, metres.
+    pub tool_m: [f64; 3],
+}
+
+impl RobotAccuracy {
+    /// In millimetres, with a usual tool where none is named.
+    pub fn new(accuracy_mm: f64, tool_m: Option<[f64; 3]>) -> Self {
+        Self { error_m: accuracy_mm * 1e-3, tool_m: tool_m.unwrap_or(USUAL_TOOL) }
+    }
+}
+
+/// What a robot is off, standard deviations per axis, metres and radians.
+#[derive(Debug, Clone, Copy)]
+struct Off {
+    metres: f64,
+    radians: f64,
+}
+
+impl Off {
+    /// Covariance of a point in this direction and distance of the tip.
+    fn at(self, lever: &Vector3<f64>) -> Matrix3<f64> {
+        let turned = Matrix3::identity() * lever.norm_squared() - lever * lever.transpose();
+        Matrix3::identity() * self.metres.powi(2) + turned * self.radians.powi(2)
+    }
+}
+
+/// How near a tool arrives by a calibration of a robot of which the accuracy is known.
+#[derive(Debug, Clone)]
+pub struct ReachByAccuracy {
+    hand_eye: HandEye,
+    /// Of the hand-eye transform, metres and radians.
+    covariance: Matrix6<f64>,
+    law: SmallSample,
+    views: Vec<Pose<Camera, Target>>,
+    target: TargetSpec,
+    accuracy: RobotAccuracy,
+    off: Off,
+    tool: Vector3<f64>,
+    /// Of the place where the tip of the tool is found, in the frame of the tip.
+    tool_covariance: Matrix3<f64>,
+}
+
+impl ReachByAccuracy {
+    /// Of a calibration by reported poses; `views` is where the camera saw the target. `None` without views, and for a covariance that is
+    /// none.
+    pub(crate) fn new(
+        accuracy: &RobotAccuracy,
+        noise: [f64; 2],
+        (hand_eye, covariance, law): (&HandEye, &Matrix6<f64>, SmallSample),
+        views: Vec<Pose<Camera, Target>>,
+        target: &TargetSpec,
+    ) -> Option<Self> {
+        let metres = accuracy.error_m / 3.0_f64.sqrt();
+        let off = Off { metres: metres.max(noise[0]), radians: (metres * TURN_PER_M).max(noise[1]) };
+        let tool = Vector3::from(accuracy.tool_m);
+        let tool_covariance = of_tool(&turns(&mut Draw::new(SEED)), &off.at(&tool))?;
+        let (hand_eye, covariance, target, accuracy) = (*hand_eye, *covariance, *target, *accuracy);
+        let by_accuracy = Self { hand_eye, covariance, law, views, target, accuracy, off, tool, tool_covariance };
+        (!by_accuracy.views.is_empty()).then_some(by_accuracy)
+    }
+
+    /// At points of the target where it was seen.
+    pub fn at_target(&self) -> Option<ReachErrors> {
+        let points = self.target.points();
+        let seen = |view: usize, random: &mut Draw| self.views[view].isometry() * points[random.below(points.len())];
+        if points.is_empty() { None } else { self.errors(seen) }
+    }
+
+    /// At points in the coordinates of a camera beside the arm, metres: the largest of their errors. `None` with a camera on the arm.
+    pub fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
+        let points = in_camera.iter().filter(|_| self.stands_still());
+        points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
+    }
+
+    /// Whether the camera is beside the arm.
+    pub fn stands_still(&self) -> bool {
+        self.hand_eye.mode() == Mode::EyeToHand
+    }
+
+    /// What was said of the robot and its tool.
+    pub fn accuracy(&self) -> &RobotAccuracy {
+        &self.accuracy
+    }
+
+    fn errors(&self, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Option<ReachErrors> {
+        let planned = planned(self.views.len(), point);
+        let as_it_is_95_m = self.quantile(&planned, &self.covariance)?;
+        Some(ReachErrors {
+            as_it_is_95_m,
+            corrected_95_m: None,
+            // Of as many draws that are others.
+            as_it_is_least_95_m: self.quantile(&planned, &Matrix6::zeros())?.min(as_it_is_95_m),
+            repeatability_95_m: None,
+        })
+    }
+
+    fn quantile(&self, planned: &[Plan], of_hand_eye: &Matrix6<f64>) -> Option<f64> {
+        let root = if of_hand_eye.amax() > 0.0 { Cholesky::new(*of_hand_eye)?.l() } else { Matrix6::zeros() };
+        let axis = self.mean_axis()?;
+        let freedom = self.law.degrees_of_freedom.min(1e4);
+        let law = ChiSquared::new(freedom).ok()?;
+        let touches = planned.iter().map(|plan| self.touch(plan, &axis)).collect::<Option<Vec<_>>>()?;
+        let mut random = Draw::new(SEED);
+        let mut distances = Vec::with_capacity(DRAWS * touches.len() / APART);
+        for k in 0..DRAWS {
+            let normal = Vector6::from_fn(|_, _| random.normal());
+            let step = root * normal * (freedom / law.inverse_cdf(random.even())).sqrt();
+            for (by_hand_eye, by_robot) in touches.iter().skip(k % APART).step_by(APART) {
+                let off = by_hand_eye * step + by_robot * Vector3::from_fn(|_, _| random.normal());
+                distances.push(off.norm());
+            }
+        }
+        quantile(distances)
+    }
+
+    /// How a touch turns with the hand-eye transform, and the root of its covariance by what the robot is off.
+    fn touch(&self, plan: &Plan, axis: &Vector3<f64>) -> Option<(Matrix3x6<f64>, Matrix3<f64>)> {
+        let seen = &self.views[plan.view];
+        let base_from_tip = *self.hand_eye.base_from_tip(seen).isometry();
+        let base_from_camera = camera(&self.hand_eye, &base_from_tip);
+        let along = match self.hand_eye.mode() {
+            Mode::EyeInHand => base_from_camera.rotation * seen.isometry().rotation,
+            Mode::EyeToHand => facing(axis),
+        };
+        let turn = along * plan.turn;
+        let point = base_from_camera * plan.in_camera;
+        let turned = turn.to_rotation_matrix();
+        let mut covariance = self.off.at(&(turn * self.tool)) + turned * self.tool_covariance * turned.transpose();
+        if self.hand_eye.mode() == Mode::EyeInHand {
+            covariance += self.off.at(&(point.coords - base_from_tip.translation.vector));
+        }
+        let camera = base_from_camera.rotation.to_rotation_matrix();
+        let mut by_hand_eye = Matrix3x6::zeros();
+        by_hand_eye.fixed_columns_mut::<3>(0).copy_from(camera.matrix());
+        by_hand_eye.fixed_columns_mut::<3>(3).copy_from(&(camera * -plan.in_camera.coords.cross_matrix()));
+        Some((by_hand_eye, Cholesky::new(covariance)?.l()))
+    }
+
+    /// The mean z axis of the tip over the views, in the base.
+    fn mean_axis(&self) -> Option<Vector3<f64>> {
+        let axes = self.views.iter().map(|seen| self.hand_eye.base_from_tip(seen).rotation() * Vector3::z());
+        axes.sum::<Vector3<f64>>().try_normalize(1e-9)
+    }
+}
+
+/// Covariance of the place `t` of the tip of a tool for which with the shift `s` all `R_k (t − l_k) − s` are least, where each `l_k` has
+/// this one.
+fn of_tool(turns: &[UnitQuaternion<f64>], of_each: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let rows = turns.iter().map(|turn| {
+        let turn = turn.to_rotation_matrix();
+        let mut row = Matrix3x6::zeros();
+        row.fixed_columns_mut::<3>(0).copy_from(turn.matrix());
+        row.fixed_columns_mut::<3>(3).copy_from(&-Matrix3::identity());
+        (row, *turn.matrix())
+    });
+    let information: Matrix6<f64> = rows.clone().map(|(row, _)| row.transpose() * row).sum();
+    let solved = Cholesky::new(information)?.inverse();
+    let each = rows.map(|(row, turn)| {
+        let by_place = (solved * row.transpose() * turn).fixed_rows::<3>(0).into_owned();
+        by_place * of_each * by_place.transpose()
+    });
+    Some(each.sum())
+}
+
+#[cfg(test)]
+#[path = "robot_accuracy_tests.rs"]
+mod tests;
