@@ -128,7 +128,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     let (error_m, of) = expected(1.0)?;
     let error_of = match of {
         Promise::Point => "point",
-        Promise::Reach => REACH,
+        Promise::Reach | Promise::ReachByAccuracy => REACH,
         Promise::ReachCorrected => REACH_CORRECTED,
     };
     let document = PlanDocument { format: "handeye-plan", version: 1, error_of, error_mm: error_m * 1e3, poses };

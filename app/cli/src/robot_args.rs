@@ -14,8 +14,9 @@ pub struct RobotArgs {
     /// given, or 0,0,0.1.
     #[arg(long = "tool", value_name = "X,Y,Z", value_parser = tool, allow_hyphen_values = true, help_heading = heading::ESTIMATE)]
     pub tool_m: Option<[f64; 3]>,
-    /// How far the TCP is from where the robot reports it, RMS over the region where it works, such as its maker states; what the data
-    /// say if not given. A tool arrives within an error that follows from it where the chain of the arm is not known.
+    /// How far the TCP is from where the robot reports it, RMS over the region where it works: some tenths of a millimetre and more, not
+    /// the repeatability of the data sheet; what the data say if not given. A tool arrives within an error that follows from it where the
+    /// errors of the arm are not known.
     #[arg(long = "robot-accuracy", value_name = "MM", value_parser = accuracy, help_heading = heading::ESTIMATE)]
     pub accuracy_mm: Option<f64>,
 }

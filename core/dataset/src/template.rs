@@ -269,7 +269,7 @@ fn robot_table(text: &mut Text, table: &Found, rotations: &[&str], joints: usize
         units(text, "angle_unit", "the rotation", ANGLES, table.largest(4..columns));
     }
     text.line(format_args!(
-        "{CHOICE}{:<32}# how accurate the robot is, millimetres RMS: a tool arrives within an error that follows from it",
+        "{CHOICE}{:<32}# how accurate the robot is, millimetres RMS, not its repeatability: for reach errors",
         "accuracy_mm ="
     ));
     text.choices(

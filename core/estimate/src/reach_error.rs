@@ -75,7 +75,8 @@ pub struct ReachErrors {
     pub as_it_is_95_m: f64,
     /// By corrected poses and commands; `None` where no commands are corrected.
     pub corrected_95_m: Option<f64>,
-    /// The part of the first that no view lowers: what the arm is off by its most probable errors, and does not repeat.
+    /// The part of the first that no view lowers: what the arm is off by its most probable errors, and does not repeat; or what follows
+    /// from the stated accuracy of the robot.
     pub as_it_is_least_95_m: f64,
     /// The part of the error by corrected poses that no view lowers: what the arm does not repeat, at the view, at the touch and where the
     /// tool is found; `None` where of the arm no more is known than how accurate it is.

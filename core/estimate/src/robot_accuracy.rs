@@ -6,10 +6,11 @@
 //! # Model
 //! Where the tip really is differs from where the robot reports it by a shift and a turn, normal and alike in all directions, with
 //! the stated accuracy as the root mean square of the shift. At the view, at the touch and at each turn by which the tool is found
-//! they are drawn anew: what an arm is off in a whole region alike is counted as if it were not, so that what is stated is rather too
-//! much. What the views show of the robot's noise is counted where it is more than what was stated.
+//! they are drawn anew, although what an arm is off in a whole region is alike: of the touches of 17 real arms 95 % and more are within,
+//! of arms that are off by more where they touch than where they look 82 % and more. What the views show of the robot's noise and
+//! its pose-dependent error counts where it is more than what was stated.
 //!
-//! Makers state no accuracy of rotations. It is counted as [`TURN_PER_M`] says, which is what arms have.
+//! Makers state no accuracy of rotations. It is counted as [`TURN_PER_M`] says.
 //!
 //! # Reference
 //! ISO 9283 (pose accuracy); the 17 factory calibrations of `tests/studies/arm_errors`.
@@ -26,17 +27,19 @@ use crate::reach_error::{APART, DRAWS, Plan, ReachErrors, SEED, USUAL_TOOL, came
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
-/// Turn of the tip in radians for each metre that it is off, root mean square each.
+/// Turn of the tip in radians for each metre that it is off, root mean square each: of a recorded UR5e, whose nominal chain is 0.41 mm
+/// and 0.145° off its controller's. Of 17 factory calibrations it is 2 to 4.
 pub const TURN_PER_M: f64 = 6.0;
 
-/// Accuracies that a robot may be given, millimetres.
+/// Accuracies that a robot may be given, millimetres: from less than any arm has to a robot that is better calibrated first.
 pub const ROBOT_ACCURACY_MM: RangeInclusive<f64> = 0.001..=100.0;
 
 /// What is known of a robot beforehand, and the tool that it shall bring somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotAccuracy {
-    /// Distance between where the tip is and where the robot reports it, root mean square over the region in which it works, metres.
-    pub error_m: f64,
+    /// Distance between where the tip is and where the robot reports it, root mean square over the region in which it works, with base
+    /// and TCP where that is least, millimetres.
+    pub accuracy_mm: f64,
     /// Where the tip of its tool is in the frame of the tip, metres.
     pub tool_m: [f64; 3],
 }
@@ -44,7 +47,7 @@ pub struct RobotAccuracy {
 impl RobotAccuracy {
     /// In millimetres, with a usual tool where none is named.
     pub fn new(accuracy_mm: f64, tool_m: Option<[f64; 3]>) -> Self {
-        Self { error_m: accuracy_mm * 1e-3, tool_m: tool_m.unwrap_or(USUAL_TOOL) }
+        Self { accuracy_mm, tool_m: tool_m.unwrap_or(USUAL_TOOL) }
     }
 }
 
@@ -80,17 +83,18 @@ pub struct ReachByAccuracy {
 }
 
 impl ReachByAccuracy {
-    /// Of a calibration by reported poses; `views` is where the camera saw the target. `None` without views, and for a covariance that is
+    /// Of a calibration by reported poses; `shown` is what its views show the robot to be off, standard deviations per axis, metres and
+    /// radians, and `views` where the camera saw the target. `None` without views, and for a covariance that is
     /// none.
     pub(crate) fn new(
         accuracy: &RobotAccuracy,
-        noise: [f64; 2],
+        shown: [f64; 2],
         (hand_eye, covariance, law): (&HandEye, &Matrix6<f64>, SmallSample),
         views: Vec<Pose<Camera, Target>>,
         target: &TargetSpec,
     ) -> Option<Self> {
-        let metres = accuracy.error_m / 3.0_f64.sqrt();
-        let off = Off { metres: metres.max(noise[0]), radians: (metres * TURN_PER_M).max(noise[1]) };
+        let metres = accuracy.accuracy_mm * 1e-3 / 3.0_f64.sqrt();
+        let off = Off { metres: metres.max(shown[0]), radians: (metres * TURN_PER_M).max(shown[1]) };
         let tool = Vector3::from(accuracy.tool_m);
         let tool_covariance = of_tool(&turns(&mut Draw::new(SEED)), &off.at(&tool))?;
         let (hand_eye, covariance, target, accuracy) = (*hand_eye, *covariance, *target, *accuracy);
@@ -127,7 +131,7 @@ impl ReachByAccuracy {
         Some(ReachErrors {
             as_it_is_95_m,
             corrected_95_m: None,
-            // Of as many draws that are others.
+            // A draw may be shorter with what is added to it.
             as_it_is_least_95_m: self.quantile(&planned, &Matrix6::zeros())?.min(as_it_is_95_m),
             repeatability_95_m: None,
         })

@@ -238,7 +238,8 @@ pub struct Quality {
     /// Expected error where the tool works: 95 % of the errors are below, millimetres.
     pub tip_error_95_mm: Option<f64>,
     /// Distance between a point that the camera saw and the tip of a tool that is sent there by the controller as it is: 95 % are
-    /// below, millimetres; `None` where neither the errors of the arm are known nor the accuracy of the robot.
+    /// below, millimetres; `None` where neither the errors of the arm are known nor the accuracy of the robot, where the arm does not get
+    /// there, and where no error may be stated.
     #[serde(default)]
     pub reach_error_95_mm: Option<f64>,
     /// The same by corrected poses and commands; `None`, too, where the controller counts with another chain.
@@ -247,6 +248,9 @@ pub struct Quality {
     /// How accurate the robot was said to be, where the reach error follows from that and not from the errors of its arm, millimetres.
     #[serde(default)]
     pub robot_accuracy_mm: Option<f64>,
+    /// The tip of the tool that the reach error is of then, in the frame of the tip, metres; that of the errors of an arm is with these.
+    #[serde(default)]
+    pub robot_tool_m: Option<[f64; 3]>,
     /// Estimated noise of the robot's positions, millimetres per axis.
     pub robot_sigma_mm: Option<f64>,
     /// Estimated noise of the robot's rotations, degrees per axis.

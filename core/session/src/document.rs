@@ -61,7 +61,7 @@ pub struct SessionMeta {
     /// Where the tip of the tool is in the frame of the tip, metres; without it a usual one is counted with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool_m: Option<[f64; 3]>,
-    /// How accurate the robot is, millimetres, see [`RobotAccuracy`].
+    /// How accurate the robot is, millimetres, see [`RobotAccuracy`](handeye_estimate::robot_accuracy::RobotAccuracy).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot_accuracy_mm: Option<f64>,
     /// How the joints of an arm that is not known move, from the base up. Without it they are taken for six that turn, as

@@ -182,6 +182,7 @@ fn an_edit_that_changes_nothing_is_no_step() {
         Edit::SetTarget(before.meta.target),
         Edit::SetMode(before.meta.mode),
         Edit::SetCamera(before.meta.camera),
+        Edit::SetRobotAccuracy(before.meta.robot_accuracy_mm),
         set_taught(TaughtChange::Replace, &[]),
         Edit::SetExportNames(json!(null)),
     ];
@@ -218,6 +219,8 @@ fn edits_read_back_as_they_were_written() {
         Edit::SetMode(Mode::EyeToHand),
         Edit::SetCamera(None),
         Edit::SetCamera(meta().camera),
+        Edit::SetRobotAccuracy(Some(0.03)),
+        Edit::SetRobotAccuracy(None),
         Edit::SetTaught {
             change: TaughtChange::Rename { from: "a\n".into(), to: "b".into() },
             poses: vec![TaughtPose::new("b", Goal::Tip(pose(1)))],

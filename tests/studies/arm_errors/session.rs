@@ -159,7 +159,7 @@ pub fn by_accuracy(cell: &Cell, asked: Asked, seed: u64) -> Result<ByAccuracy, F
     let accuracy = accuracy(cell, &cell.take(VERY_MANY, &mut rng)).ok_or("not aligned")?;
     let (mut observations, _) = observed(cell, &placed, &taken, asked.free_lens);
     observations.views.iter_mut().for_each(|view| view.tip_from_joints.clear());
-    let robot = RobotAccuracy { error_m: accuracy[0], tool_m: cell.tool.translation.vector.into() };
+    let robot = RobotAccuracy::new(accuracy[0] * 1e3, Some(cell.tool.translation.vector.into()));
     let wanted = FindingOptions::default().with_robot_accuracy(Some(robot));
     let work = CancelToken::default();
     let calibration = calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &work)?;

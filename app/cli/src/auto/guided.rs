@@ -155,9 +155,9 @@ impl<'a, 's> GuidedSequence<'a, 's> {
     fn solve(&self) -> Result<(Observations, Option<Calibration>), Failure> {
         let document = self.sequence.session.document();
         let seen = document.observations(self.image_size, |id| self.sights.get(&id).cloned());
-        let SessionObservations { observations, arm, .. } = seen;
+        let SessionObservations { observations, arm, robot_accuracy, .. } = seen;
         let cancel: &CancelToken = self.sequence.cancel;
-        let wanted = FindingOptions::default().with_arm(arm.as_ref());
+        let wanted = FindingOptions::default().with_arm(arm.as_ref()).with_robot_accuracy(robot_accuracy);
         let calibration = calibrate_with(&observations, Method::Joint, Options::default(), &wanted, cancel).ok();
         self.check_cancelled()?;
         Ok((observations, calibration))

@@ -93,8 +93,8 @@ pub struct AutoArgs {
 /// What guided capture is asked for.
 #[derive(Debug, Args)]
 struct GuidedArgs {
-    /// Error (95 %) to be reached, millimetres: what a tool arrives within where the arm is known, else that of a measured
-    /// point; 0.3 if not given.
+    /// Error (95 %) to be reached, millimetres: what a tool arrives within where the arm or the accuracy of the robot is
+    /// known, else that of a measured point; 0.3 if not given.
     #[arg(long, value_name = "MM", value_parser = positive, help_heading = heading::GUIDED)]
     goal: Option<f64>,
     /// Captures at the most; 40 if not given.
@@ -257,7 +257,7 @@ pub fn run(args: &AutoArgs) -> Result<(), Failure> {
     drop(cell);
 
     let goal_m = guide.as_ref().map_or(model::Goal::default().0, |guide| guide.options().goal_m);
-    // The session has the tool.
+    // The session has the tool and the accuracy.
     let robot = RobotArgs::default();
     let wanted = Wanted { method: Method::Joint, options: Options::default(), goal_m, robot };
     let mut solution = solve::folder(&folder, wanted, truth, &cancel)?;

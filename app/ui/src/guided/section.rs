@@ -184,10 +184,10 @@ pub fn error_ui(ui: &mut Ui, model: &Model, guide: &Guide, left: Option<Text>) {
         (Promise::Point, false) => {
             text!("Expected error {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
         }
-        (Promise::Reach, true) => {
+        (Promise::Reach | Promise::ReachByAccuracy, true) => {
             text!("In the box a tool arrives within {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
         }
-        (Promise::Reach, false) => {
+        (Promise::Reach | Promise::ReachByAccuracy, false) => {
             text!("A tool arrives within {error} mm (95 %), goal {goal} mm", error = error, goal = goal)
         }
         (Promise::ReachCorrected, true) => text!(

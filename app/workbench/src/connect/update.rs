@@ -119,16 +119,17 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
             if let Err(error) = farewell {
                 tracing::warn!(%error, "the connection before was left alone");
             }
+            // Which cell they are of no session says.
+            if source != cx.model.source && !cx.model.document().captures.is_empty() {
+                cx.model.notify(
+                    Severity::Warning,
+                    text!("If this is another cell than that of the captures, begin a new session (Ctrl+N): captures of two cells do not calibrate together"),
+                );
+            }
         }
         Err(error) => {
             cx.model.notify(Severity::Error, text!("The connection could not be started: {error}", error = error));
         }
-    }
-    if source != cx.model.source && !cx.model.document().captures.is_empty() {
-        cx.model.notify(
-            Severity::Warning,
-            text!("If this is another cell than that of the captures, begin a new session (Ctrl+N): captures of two cells do not calibrate together"),
-        );
     }
     cx.model.source = source;
     cx.model.capture = None;

@@ -109,12 +109,14 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
 /// How near a tool arrives, and why that is not known.
 fn reach(result: &CalibrationResult) -> Option<String> {
     let Some(plain) = result.quality.reach_error_95_mm else {
-        let is_asked = result.mode.is_some() && result.quality.tip_error_95_mm.is_some() && result.arm.is_none();
-        let why = "without the errors of the arm, which take its kinematics and the joint values of every capture, or the accuracy of the \
-                   robot (--robot-accuracy)";
-        return is_asked.then(|| format!("how near a tool arrives is not known {why}"));
+        let is_unknown = result.arm.as_ref().is_none_or(|arm| arm.contradicted);
+        let is_asked = result.mode.is_some() && result.quality.tip_error_95_mm.is_some() && is_unknown;
+        let takes = "that takes the errors of the arm, by its kinematics and the joint values of every capture, or the accuracy of the \
+                     robot (--robot-accuracy)";
+        return is_asked.then(|| format!("how near a tool arrives is not known: {takes}"));
     };
-    let length = result.arm.as_ref().map(|arm| format!(" of {:.0} mm", Vector3::from(arm.tool_m).norm() * 1e3));
+    let tool_m = result.quality.robot_tool_m.or_else(|| Some(result.arm.as_ref()?.tool_m));
+    let length = tool_m.map(|tool_m| format!(" of {:.0} mm", Vector3::from(tool_m).norm() * 1e3));
     let stated = format!(
         "a tool{} arrives within {plain:.3} mm of a point that the camera saw in 95 % of cases as the controller is",
         length.unwrap_or_default()

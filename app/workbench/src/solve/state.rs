@@ -68,7 +68,8 @@ impl Solved {
         let quality = &self.result.quality;
         let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
         let reach = [quality.reach_error_95_mm, quality.reach_error_corrected_95_mm].map(metres);
-        Promised::of(goal_m, reach[0], reach[1], metres(quality.tip_error_95_mm))
+        let promised = Promised::of(goal_m, reach[0], reach[1], metres(quality.tip_error_95_mm))?;
+        Some(promised.by_accuracy(quality.robot_accuracy_mm.is_some()))
     }
 }
 

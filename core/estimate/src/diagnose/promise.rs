@@ -3,10 +3,12 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::Calibration;
+use super::findings::FindingOptions;
 use crate::corrected_arm::CorrectedArm;
 use crate::placement::ArmOfViews;
 use crate::reach_error::{Reach, ReachErrors, Seen};
 use crate::robot_accuracy::{ReachByAccuracy, RobotAccuracy};
+use crate::stated_uncertainty::StatedUncertainty;
 use crate::uncertainty::quality::TipBox;
 use crate::{Fit, ViewStatus};
 use handeye_geometry::targets::TargetSpec;
@@ -29,6 +31,8 @@ pub enum Promise {
     Point,
     /// A tool that is sent to such a point, by commands as they are.
     Reach,
+    /// The same by a robot of which no more is known than how accurate it is said to be.
+    ReachByAccuracy,
     /// The same by corrected commands.
     ReachCorrected,
 }
@@ -46,6 +50,13 @@ impl Promised {
             Some(error_m) => Self { error_m, least_m: 0.0, of: Promise::ReachCorrected },
             None => Self { error_m: as_it_is, least_m: 0.0, of: Promise::Reach },
         })
+    }
+
+    /// The same where what a tool arrives within follows from the stated accuracy of the robot.
+    #[must_use]
+    pub fn by_accuracy(self, is_so: bool) -> Self {
+        let of = if is_so && self.of == Promise::Reach { Promise::ReachByAccuracy } else { self.of };
+        Self { of, ..self }
     }
 }
 
@@ -94,9 +105,10 @@ impl Calibration {
         };
         let as_it_is_m = reach.map(|reach| reach.as_it_is_95_m);
         let promised = Promised::of(goal_m, as_it_is_m, reach.and_then(|reach| reach.corrected_95_m), point_m)?;
+        let promised = promised.by_accuracy(self.robot_accuracy().is_some());
         let least_m = reach.map_or(0.0, |reach| match promised.of {
             Promise::Point => 0.0,
-            Promise::Reach => reach.as_it_is_least_95_m,
+            Promise::Reach | Promise::ReachByAccuracy => reach.as_it_is_least_95_m,
             Promise::ReachCorrected => reach.repeatability_95_m.unwrap_or(0.0),
         });
         Some(Promised { least_m, ..promised })
@@ -142,18 +154,26 @@ pub(super) fn reach(fit: &Fit, of_views: &ArmOfViews, target: &TargetSpec) -> Op
     Reach::new((&arm, errors), fit.hand_eye.as_ref()?, seen.collect(), target, &tool, is_its_own)
 }
 
-/// The robot of a calibration of which no more is known than how accurate it is; `None` where that gives no error of reach.
+/// The robot of a calibration of which no more is known than how accurate it is, and how near a tool arrives at the target; `None` where
+/// its arm is known, and where no error may be stated.
 pub(super) fn reach_by_accuracy(
     calibration: &Calibration,
-    accuracy: &RobotAccuracy,
+    wanted: &FindingOptions<'_>,
     target: &TargetSpec,
-) -> Option<ReachByAccuracy> {
+) -> Option<(ReachByAccuracy, ReachErrors)> {
+    let is_asked = calibration.reach.is_none() && calibration.stated != StatedUncertainty::Nothing;
+    let accuracy = wanted.robot_accuracy.as_ref().filter(|_| is_asked)?;
     let joint = calibration.joint.as_ref()?;
     let of_hand_eye = (calibration.hand_eye.as_ref()?, calibration.hand_eye_covariance()?, joint.small_sample);
     let used = calibration.views.iter().filter(|view| view.status == ViewStatus::Used);
     let views = used.filter_map(|view| view.camera_from_target).collect();
-    let noise = [joint.noise.robot_m, joint.noise.robot_rad];
-    ReachByAccuracy::new(accuracy, noise, of_hand_eye, views, target)
+    // The controller as it is has the pose-dependent error as well.
+    let noise = joint.noise;
+    let [field_m, field_rad] = if joint.field.is_some() { [noise.field_m, noise.field_rad] } else { [0.0; 2] };
+    let shown = [noise.robot_m.hypot(field_m), noise.robot_rad.hypot(field_rad)];
+    let by_accuracy = ReachByAccuracy::new(accuracy, shown, of_hand_eye, views, target)?;
+    let at_target = by_accuracy.at_target()?;
+    Some((by_accuracy, at_target))
 }
 
 #[cfg(test)]

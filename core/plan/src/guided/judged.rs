@@ -35,12 +35,18 @@ impl JudgedError {
             })?;
             return Some(Self { promised, at_upper_levels_m, tool_box: tool_box.copied() });
         }
-        let freedom = calibration.arm()?.small_sample.degrees_of_freedom;
+        // What follows from a stated accuracy has no level that is estimated.
+        let (law, known_m) = match promised.of {
+            Promise::ReachByAccuracy => (joint.small_sample, promised.least_m),
+            _ => (calibration.arm()?.small_sample, 0.0),
+        };
+        let freedom = law.degrees_of_freedom;
         // That the levels may be larger is a part of what is stated.
         let law = SmallSample { degrees_of_freedom: freedom, ..SmallSample::KNOWN };
         let stated = law.radius_95(&Matrix3::identity()) / SmallSample::KNOWN.radius_95(&Matrix3::identity());
         let times = (upper_level(freedom) / stated).max(1.0);
-        Some(Self { promised, at_upper_levels_m: promised.error_m * times, tool_box: tool_box.copied() })
+        let estimated_m = (promised.error_m.powi(2) - known_m.powi(2)).max(0.0).sqrt();
+        Some(Self { promised, at_upper_levels_m: known_m.hypot(estimated_m * times), tool_box: tool_box.copied() })
     }
 
     /// By which part of what it is now that which views lower has to become for the goal; `None` where no view gets there.
@@ -63,7 +69,41 @@ pub(super) fn upper_level(degrees_of_freedom: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use handeye_estimate::diagnose::calibrate_with;
+    use handeye_estimate::diagnose::findings::FindingOptions;
+    use handeye_estimate::handeye::Mode;
+    use handeye_estimate::robot_accuracy::RobotAccuracy;
+    use handeye_estimate::{Method, Options};
+    use handeye_geometry::observations::Noise;
+    use handeye_geometry::progress::CancelToken;
+    use handeye_simulate::session::{Setup, session};
+
     use super::*;
+
+    /// A robot of which the accuracy alone is known is judged by that, at the board and in a box before a camera beside it.
+    #[test]
+    fn what_follows_from_a_stated_accuracy_is_no_part_of_what_noise_levels_may_make_larger() {
+        let noise = Noise { corner_px: 0.1, robot_m: 2e-5, robot_rad: 1e-4, ..Noise::EXACT };
+        for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+            let observations = session(&Setup { noise, ..Setup::new(mode, 12, 9) }).observations(false);
+            let wanted = FindingOptions::default().with_robot_accuracy(Some(RobotAccuracy::new(0.5, None)));
+            let cancel = CancelToken::default();
+            let calibration =
+                calibrate_with(&observations, Method::Joint, Options::default(), &wanted, &cancel).expect("solves");
+            let judged = JudgedError::of(&calibration, 3e-4, None).expect("a reach");
+            let Promised { error_m, least_m, of } = judged.promised;
+            assert_eq!(of, Promise::ReachByAccuracy, "{mode:?}");
+            assert!(judged.at_upper_levels_m >= error_m && judged.at_upper_levels_m < 1.2 * error_m, "{judged:?}");
+            assert!(least_m > 3e-4 && judged.ratio_to(3e-4).is_none(), "no view gets there: {judged:?}");
+            assert_eq!(judged.ratio_to(2.0 * judged.at_upper_levels_m), Some(1.0));
+            let seen = calibration.views[0].camera_from_target.expect("seen").translation();
+            let around = |half_m: f64| nalgebra::Point3::from(seen.add_scalar(half_m));
+            let tool_box = TipBox::in_camera(around(-0.01), around(0.01));
+            let in_box = JudgedError::of(&calibration, 3e-4, Some(&tool_box)).expect("in its box").promised;
+            let expected = if mode == Mode::EyeToHand { Promise::ReachByAccuracy } else { Promise::Point };
+            assert_eq!(in_box.of, expected, "a point of a camera on the arm is in many places");
+        }
+    }
 
     #[test]
     fn what_no_view_lowers_is_no_part_of_what_has_to_become_less() {

@@ -74,7 +74,9 @@ impl Ending {
                 let error = format!("{:.3}", promised.error_m * 1e3);
                 match promised.of {
                     Promise::Point => text!("The goal is reached: the expected error is {error} mm", error = error),
-                    Promise::Reach => text!("The goal is reached: a tool arrives within {error} mm", error = error),
+                    Promise::Reach | Promise::ReachByAccuracy => {
+                        text!("The goal is reached: a tool arrives within {error} mm", error = error)
+                    }
                     Promise::ReachCorrected => {
                         text!(
                             "The goal is reached with corrected commands: a tool arrives within {error} mm",
@@ -86,6 +88,11 @@ impl Ending {
             Self::Repeatability { promised } if promised.of == Promise::Reach => text!(
                 "A tool arrives within {least} mm by what the arm is off and does not repeat alone, and more poses do not lower that: have the \
                  arm calibrated, or ask for less",
+                least = format!("{:.3}", promised.least_m * 1e3)
+            ),
+            Self::Repeatability { promised } if promised.of == Promise::ReachByAccuracy => text!(
+                "A tool arrives within {least} mm by the stated accuracy of the robot alone, and more poses do not lower that: record the \
+                 joint values and name the arm, or ask for less",
                 least = format!("{:.3}", promised.least_m * 1e3)
             ),
             Self::Repeatability { promised } => text!(

@@ -88,8 +88,8 @@ def calibrate(
         theta, metres and radians; or the path of a URDF file, where that leaves a choice as (path, base link, tip link). Where
         it stands and what its tool is follow from the poses.
     robot_accuracy_mm
-        How far the tip is from where the robot reports it, millimetres RMS over the region where it works, such as its maker states.
-        Where the arm is not given, `Calibration.reach_error_95_mm` follows from it.
+        How far the tip is from where the robot reports it, millimetres RMS over the region where it works: some tenths and more, not
+        the repeatability of the data sheet. Where the arm is not given, `Calibration.reach_error_95_mm` follows from it.
     method
         joint, or one closed form: tsai_lenz, park_martin, horaud, andreff, daniilidis, shah, li.
     keep_outliers

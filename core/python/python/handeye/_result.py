@@ -62,7 +62,8 @@ class Calibration:
     None for pose pairs (nothing says where points are measured) and where a finding is a problem."""
     reach_error_95_mm: Optional[float]
     """How far from a point that the camera saw the tip of a tool arrives by the controller as it is: 95 % are below, millimetres. By the
-    errors of the arm, or where it is not given by the accuracy of the robot; None where neither is known. With an arm,
+    errors of the arm, or where it is not given by the accuracy of the robot; None where neither is known, and where a finding is a
+    problem. With an arm,
     `Calibration.arm` has it by corrected commands too."""
     robot_accuracy_mm: Optional[float]
     """The stated accuracy of the robot that it follows from; None otherwise."""

@@ -163,6 +163,7 @@ fn the_accuracy_of_the_robot_says_how_near_a_tool_arrives() {
     fs::write(folder.join("dataset.toml"), description.replace("[robot]", "[robot]\naccuracy_mm = 0.5"))
         .expect("written");
     assert_eq!(calibrated(&folder, &[]), said);
+    assert_eq!(calibrated(&sample(), &["--robot-accuracy", "0.03"]).robot_accuracy_mm, Some(0.03), "as it was stated");
 
     let nothing = CellSource::Address("tcp://127.0.0.1:1".to_owned());
     let mut bench = Workbench::start(nothing, &home.path().join("sessions"), None);

@@ -29,14 +29,15 @@ pub fn accuracy_ui(ui: &mut Ui, model: &Model) {
         instead_ui(ui, tr!(language, "The expected error appears with the first joint calibration"));
         return;
     };
-    // Where a tool is known the goal is asked of it, and poses are planned for it.
+    // Where a tool is known the goal is asked of it. By the errors of an arm poses are planned for it, too.
     let promised = model.solve.solved.as_ref().and_then(|solved| solved.promised(model.view.goal.0));
     let is_of_point = promised.is_none_or(|promised| promised.of == Promise::Point);
+    let are_for_point = is_of_point || promised.is_some_and(|promised| promised.of == Promise::ReachByAccuracy);
     let goal_mm = is_of_point.then_some(model.view.goal.0 * 1e3);
     ui.label(RichText::new(verdict(curve, now, goal_mm).in_language(language)).color(Palette::of(ui).text));
     let room = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(room);
-    let planned = if is_of_point { planned(model, now) } else { Vec::new() };
+    let planned = if are_for_point { planned(model, now) } else { Vec::new() };
     let chart = Chart::new(curve, axes::plot_rect(room), goal_mm, planned);
     chart.paint(ui, curve, now, goal_mm, model);
     chart.hover_ui(ui, curve, language);

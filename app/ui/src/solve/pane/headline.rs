@@ -60,13 +60,22 @@ fn verdict_ui(ui: &mut Ui, model: &Model, solved: &Solved, promised: &Promised, 
     };
     let palette = Palette::of(ui);
     ui.add(Label::new(RichText::new(verdict).color(palette.tone(tone))).wrap());
-    let repeats = solved.calibration.reach_errors().and_then(|reach| reach.repeatability_95_m);
-    let limit = repeats.filter(|repeats| !is_reached && promised.of != Promise::Point && *repeats > model.view.goal.0);
-    if let Some(limit_m) = limit {
-        let words = text!(
-            "{limit} mm of it is what the arm does not repeat: more captures do not lower that.",
-            limit = format!("{:.2}", limit_m * 1e3)
-        );
+    let reach = solved.calibration.reach_errors();
+    let limit_m = reach.and_then(|reach| match promised.of {
+        Promise::Point => None,
+        Promise::ReachByAccuracy => Some(reach.as_it_is_least_95_m),
+        Promise::Reach | Promise::ReachCorrected => reach.repeatability_95_m,
+    });
+    if let Some(limit_m) = limit_m.filter(|limit_m| !is_reached && *limit_m > model.view.goal.0) {
+        let limit = format!("{:.2}", limit_m * 1e3);
+        let words = if promised.of == Promise::ReachByAccuracy {
+            text!(
+                "{limit} mm of it follow from the accuracy of the robot: more captures do not lower that.",
+                limit = limit
+            )
+        } else {
+            text!("{limit} mm of it is what the arm does not repeat: more captures do not lower that.", limit = limit)
+        };
         ui.add(Label::new(RichText::new(words.in_language(language)).color(palette.tone(Tone::Warning))).wrap());
     }
 }
@@ -94,11 +103,12 @@ fn expected_error_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut O
         (None, false) => tr!(language, "A closed form states no uncertainty: choose the joint estimate below."),
     };
     ui.add(Label::new(RichText::new(meaning).color(palette.weak)).wrap());
-    if error_mm.is_some() && solved.result.mode.is_some() && solved.result.arm.is_none() {
+    let is_unknown = solved.result.arm.as_ref().is_none_or(|arm| arm.contradicted);
+    if error_mm.is_some() && solved.result.mode.is_some() && is_unknown {
         let reach = tr!(
             language,
-            "How near a tool arrives is not known without the errors of the arm, which take its kinematics and the joint values of every \
-             capture, or the accuracy of the robot."
+            "How near a tool arrives is not known. It takes the errors of the arm, by its kinematics and the joint values of every capture, \
+             or the accuracy of the robot."
         );
         ui.add(Label::new(RichText::new(reach).color(palette.text)).wrap());
         robot_accuracy_ui(ui, model, outbox);
@@ -140,7 +150,7 @@ fn error_of_a_point_ui(ui: &mut Ui, model: &Model, solved: &Solved) {
     moved_ui(ui, model, solved, Some(error_mm));
 }
 
-/// How near a tool arrives, which is what people calibrate for; whether the arm is known and that is.
+/// How near a tool arrives, which is what people calibrate for; whether that is known.
 fn reach_ui(ui: &mut Ui, model: &Model, solved: &Solved, outbox: &mut Outbox) -> bool {
     let language = model.view.language;
     let quality = &solved.result.quality;
@@ -180,8 +190,8 @@ fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
         let name = ui.label(tr!(language, "Accuracy of the robot"));
         let meaning = tr!(
             language,
-            "How far the TCP is from where the robot reports it, RMS over the region where it works, such as its maker states. At 0 it is \
-             not known."
+            "How far the TCP is from where the robot reports it, RMS over the region where it works: some tenths of a millimetre and \
+             more, not the repeatability of the data sheet. At 0 it is not known."
         );
         let unknown = tr!(language, "not known");
         let shown = move |mm: f64, _| if mm > 0.0 { format!("{mm} mm") } else { unknown.to_owned() };
@@ -193,7 +203,8 @@ fn robot_accuracy_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
             .custom_parser(millimetres)
             .update_while_editing(false);
         let response = ui.add(field).labelled_by(name.id).on_hover_text(meaning);
-        if response.changed() {
+        // Every value on the way of a drag would be a change of the session.
+        if response.drag_stopped() || (response.changed() && !response.dragged()) {
             let known = Some(accuracy_mm).filter(|mm| mm >= ROBOT_ACCURACY_MM.start());
             if known != said_mm {
                 outbox.send(session::Command::SetRobotAccuracy(known));

@@ -39,7 +39,6 @@ use crate::diagnose::findings::{self, Evidence, Finding, FindingCode, FindingOpt
 use crate::diagnose::hypotheses::NEED;
 use crate::diagnose::promise;
 use crate::reach_error::Reach;
-use crate::robot_accuracy::ReachByAccuracy;
 use crate::stated_uncertainty::StatedUncertainty;
 use crate::{Fit, Observations};
 use handeye_geometry::progress::Work;
@@ -166,11 +165,9 @@ pub(super) fn examined(
     let reach_at_target = reach.as_ref().and_then(Reach::at_target);
     let mut calibration =
         Calibration { fit, stated, reach, reach_by_accuracy: None, reach_at_target, diagnosis: Diagnosis::default() };
-    if let (Some(accuracy), None) = (options.robot_accuracy, calibration.reach_at_target)
-        && calibration.stated != StatedUncertainty::Nothing
-    {
-        calibration.reach_by_accuracy = promise::reach_by_accuracy(&calibration, &accuracy, &observations.target);
-        calibration.reach_at_target = calibration.reach_by_accuracy.as_ref().and_then(ReachByAccuracy::at_target);
+    if let Some((by_accuracy, at_target)) = promise::reach_by_accuracy(&calibration, options, &observations.target) {
+        calibration.reach_by_accuracy = Some(by_accuracy);
+        calibration.reach_at_target = Some(at_target);
     }
     // After the claim: the goal is judged by it.
     let of_estimate = findings::findings(observations, Some(&calibration), options);

@@ -338,7 +338,9 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
     let (advice, advised) = match promised.of {
         _ if is_reached => (None, None),
         Promise::Point => towards_goal(calibration, goal_mm).map(|(advice, advised)| (Some(advice), advised))?,
-        Promise::Reach | Promise::ReachCorrected => (Some(towards_reach(calibration, &promised, goal_mm)), None),
+        Promise::Reach | Promise::ReachByAccuracy | Promise::ReachCorrected => {
+            (Some(towards_reach(calibration, &promised, goal_mm)), None)
+        }
     };
     let text = match (promised.of, advice) {
         (Promise::Point, None) => text!(
@@ -347,7 +349,7 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
             error = error,
             goal = goal
         ),
-        (Promise::Reach, None) => text!(
+        (Promise::Reach | Promise::ReachByAccuracy, None) => text!(
             "Good enough: a tool arrives within {error} mm (95 %), below the goal of {goal} mm. Verify with captures that were not in \
              the fit.",
             error = error,
@@ -365,7 +367,7 @@ fn goal(calibration: &Calibration, goal_mm: f64) -> Option<Finding> {
             goal = goal,
             advice = advice
         ),
-        (Promise::Reach, Some(advice)) => text!(
+        (Promise::Reach | Promise::ReachByAccuracy, Some(advice)) => text!(
             "A tool arrives within {error} mm (95 %), and the goal is {goal} mm. {advice}",
             error = error,
             goal = goal,
@@ -404,6 +406,11 @@ fn towards_reach(calibration: &Calibration, promised: &Promised, goal_mm: f64) -
     match promised.of {
         Promise::Reach if least_mm > goal_mm => text!(
             "{least} mm of it is what the arm is off and does not repeat, and more views do not lower that: have the arm calibrated.",
+            least = shown(least_mm, 3)
+        ),
+        Promise::ReachByAccuracy if least_mm > goal_mm => text!(
+            "{least} mm of it follow from the stated accuracy of the robot, and more views do not lower that: record the joint values \
+             and name the arm, and its errors are estimated.",
             least = shown(least_mm, 3)
         ),
         Promise::ReachCorrected if least_mm > goal_mm => text!(
