@@ -7,7 +7,7 @@ use handeye_estimate::robot_accuracy::{ROBOT_ACCURACY_MM, RobotAccuracy};
 use handeye_session::{Document, SessionObservations};
 use handeye_workbench::arguments::heading;
 
-/// Option of commands that say how near a tool arrives.
+/// Options of commands that say how near a tool arrives.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct RobotArgs {
     /// Where the tip of the tool is in the frame of the TCP, metres, for the errors that a tool arrives within; what the data say if not

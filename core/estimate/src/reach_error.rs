@@ -326,12 +326,7 @@ impl Way {
         let in_camera = plan.in_camera;
         let base_from_tip = view.tip(&self.arm.errors);
         let base_from_camera = camera(&self.hand_eye, &base_from_tip);
-        let along = match self.hand_eye.mode() {
-            // A target's z axis points away from who looks at it.
-            Mode::EyeInHand => base_from_camera.rotation * seen.camera_from_target.isometry().rotation,
-            Mode::EyeToHand => facing(&self.axis),
-        };
-        let turn = along * plan.turn;
+        let turn = along(self.hand_eye.mode(), &base_from_camera, &seen.camera_from_target, &self.axis) * plan.turn;
         let point = base_from_camera * in_camera;
         let goal = Isometry3::from_parts((point.coords - turn * tool).into(), turn);
         Some(Touch { view, command: self.at(&goal, &seen.joints_rad)?, in_camera, turn })
@@ -373,9 +368,7 @@ impl Way {
         for ((at, turn), unexplained) in pivots.iter().zip(&truth.unexplained.pivots) {
             let believed_from_true = at.tip(&self.arm.errors).inverse() * at.tip(&truth.errors) * unexplained;
             let place = (believed_from_true * Point3::from(*tool)).coords;
-            let mut row = Matrix3x6::zeros();
-            row.fixed_columns_mut::<3>(0).copy_from(turn.to_rotation_matrix().matrix());
-            row.fixed_columns_mut::<3>(3).copy_from(&-Matrix3::identity());
+            let row = pivot_row(turn);
             information += row.transpose() * row;
             right += row.transpose() * (turn * place);
         }
@@ -494,8 +487,31 @@ pub(crate) fn camera(hand_eye: &HandEye, base_from_tip: &Isometry3<f64>) -> Isom
     }
 }
 
+/// How a tool is turned that touches straight: against the target's normal, or with a camera beside the arm along the mean `axis` of the
+/// tip.
+pub(crate) fn along(
+    mode: Mode,
+    base_from_camera: &Isometry3<f64>,
+    camera_from_target: &Pose<Camera, Target>,
+    axis: &Vector3<f64>,
+) -> UnitQuaternion<f64> {
+    match mode {
+        // A target's z axis points away from who looks at it.
+        Mode::EyeInHand => base_from_camera.rotation * camera_from_target.isometry().rotation,
+        Mode::EyeToHand => facing(axis),
+    }
+}
+
+/// How the distance to the point about which a tool turns depends on the place of its tip and on the shift of that point.
+pub(crate) fn pivot_row(turn: &UnitQuaternion<f64>) -> Matrix3x6<f64> {
+    let mut row = Matrix3x6::zeros();
+    row.fixed_columns_mut::<3>(0).copy_from(turn.to_rotation_matrix().matrix());
+    row.fixed_columns_mut::<3>(3).copy_from(&-Matrix3::identity());
+    row
+}
+
 /// A turn whose z axis is along a direction.
-pub(crate) fn facing(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+fn facing(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), direction)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }

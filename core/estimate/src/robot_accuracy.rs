@@ -23,7 +23,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use crate::handeye::draw::Draw;
 use crate::handeye::joint::SmallSample;
 use crate::handeye::{HandEye, Mode};
-use crate::reach_error::{APART, DRAWS, Plan, ReachErrors, SEED, USUAL_TOOL, camera, facing, planned, quantile, turns};
+use crate::reach_error::{
+    APART, DRAWS, Plan, ReachErrors, SEED, USUAL_TOOL, along, camera, pivot_row, planned, quantile, turns,
+};
 use handeye_geometry::frames::{Camera, Pose, Target};
 use handeye_geometry::targets::TargetSpec;
 
@@ -65,6 +67,9 @@ impl Off {
         Matrix3::identity() * self.metres.powi(2) + turned * self.radians.powi(2)
     }
 }
+
+/// How a touch turns with the hand-eye transform, and the root of its covariance by what the robot is off.
+type Missed = (Matrix3x6<f64>, Matrix3<f64>);
 
 /// How near a tool arrives by a calibration of a robot of which the accuracy is known.
 #[derive(Debug, Clone)]
@@ -126,28 +131,28 @@ impl ReachByAccuracy {
     }
 
     fn errors(&self, point: impl Fn(usize, &mut Draw) -> Point3<f64>) -> Option<ReachErrors> {
-        let planned = planned(self.views.len(), point);
-        let as_it_is_95_m = self.quantile(&planned, &self.covariance)?;
+        let (axis, planned) = (self.mean_axis()?, planned(self.views.len(), point));
+        let touches = planned.iter().map(|plan| self.touch(plan, &axis)).collect::<Option<Vec<_>>>()?;
+        let as_it_is_95_m = self.quantile(&touches, &Cholesky::new(self.covariance)?.l())?;
         Some(ReachErrors {
             as_it_is_95_m,
             corrected_95_m: None,
             // A draw may be shorter with what is added to it.
-            as_it_is_least_95_m: self.quantile(&planned, &Matrix6::zeros())?.min(as_it_is_95_m),
+            as_it_is_least_95_m: self.quantile(&touches, &Matrix6::zeros())?.min(as_it_is_95_m),
             repeatability_95_m: None,
         })
     }
 
-    fn quantile(&self, planned: &[Plan], of_hand_eye: &Matrix6<f64>) -> Option<f64> {
-        let root = if of_hand_eye.amax() > 0.0 { Cholesky::new(*of_hand_eye)?.l() } else { Matrix6::zeros() };
-        let axis = self.mean_axis()?;
+    /// The quantile of the distances where the covariance of the hand-eye transform has this root.
+    fn quantile(&self, touches: &[Missed], of_hand_eye: &Matrix6<f64>) -> Option<f64> {
+        // As good as infinite.
         let freedom = self.law.degrees_of_freedom.min(1e4);
         let law = ChiSquared::new(freedom).ok()?;
-        let touches = planned.iter().map(|plan| self.touch(plan, &axis)).collect::<Option<Vec<_>>>()?;
         let mut random = Draw::new(SEED);
         let mut distances = Vec::with_capacity(DRAWS * touches.len() / APART);
         for k in 0..DRAWS {
             let normal = Vector6::from_fn(|_, _| random.normal());
-            let step = root * normal * (freedom / law.inverse_cdf(random.even())).sqrt();
+            let step = of_hand_eye * normal * (freedom / law.inverse_cdf(random.even())).sqrt();
             for (by_hand_eye, by_robot) in touches.iter().skip(k % APART).step_by(APART) {
                 let off = by_hand_eye * step + by_robot * Vector3::from_fn(|_, _| random.normal());
                 distances.push(off.norm());
@@ -157,15 +162,11 @@ impl ReachByAccuracy {
     }
 
     /// How a touch turns with the hand-eye transform, and the root of its covariance by what the robot is off.
-    fn touch(&self, plan: &Plan, axis: &Vector3<f64>) -> Option<(Matrix3x6<f64>, Matrix3<f64>)> {
+    fn touch(&self, plan: &Plan, axis: &Vector3<f64>) -> Option<Missed> {
         let seen = &self.views[plan.view];
         let base_from_tip = *self.hand_eye.base_from_tip(seen).isometry();
         let base_from_camera = camera(&self.hand_eye, &base_from_tip);
-        let along = match self.hand_eye.mode() {
-            Mode::EyeInHand => base_from_camera.rotation * seen.isometry().rotation,
-            Mode::EyeToHand => facing(axis),
-        };
-        let turn = along * plan.turn;
+        let turn = along(self.hand_eye.mode(), &base_from_camera, seen, axis) * plan.turn;
         let point = base_from_camera * plan.in_camera;
         let turned = turn.to_rotation_matrix();
         let mut covariance = self.off.at(&(turn * self.tool)) + turned * self.tool_covariance * turned.transpose();
@@ -189,13 +190,7 @@ impl ReachByAccuracy {
 /// Covariance of the place `t` of the tip of a tool for which with the shift `s` all `R_k (t − l_k) − s` are least, where each `l_k` has
 /// this one.
 fn of_tool(turns: &[UnitQuaternion<f64>], of_each: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let rows = turns.iter().map(|turn| {
-        let turn = turn.to_rotation_matrix();
-        let mut row = Matrix3x6::zeros();
-        row.fixed_columns_mut::<3>(0).copy_from(turn.matrix());
-        row.fixed_columns_mut::<3>(3).copy_from(&-Matrix3::identity());
-        (row, *turn.matrix())
-    });
+    let rows = turns.iter().map(|turn| (pivot_row(turn), *turn.to_rotation_matrix().matrix()));
     let information: Matrix6<f64> = rows.clone().map(|(row, _)| row.transpose() * row).sum();
     let solved = Cholesky::new(information)?.inverse();
     let each = rows.map(|(row, turn)| {

@@ -16,8 +16,8 @@ pub const FORMAT: &str = "handeye-session";
 pub const MAJOR_VERSION: u32 = 1;
 /// Additions that an older reader may ignore. 1: `sequence`, `last_capture`, `taught`, `export_names`, and what a
 /// capture has from `id` on. 2: `arm`. Without a number of its own, for it is not there where older readers look:
-/// `joint_kinds`, of arms with other joints than six that turn, `cell` of a taught pose, `tool_m` and `robot_accuracy_mm`. Older readers refuse captures
-/// without `base_from_tip`, of a camera without a robot, and an `arm` that is a `chain`.
+/// `joint_kinds`, of arms with other joints than six that turn, `cell` of a taught pose, `tool_m` and `robot_accuracy_mm`.
+/// Older readers refuse captures without `base_from_tip`, of a camera without a robot, and an `arm` that is a `chain`.
 pub const MINOR_VERSION: u32 = 2;
 
 /// The folder of images in a session.
