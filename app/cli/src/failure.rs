@@ -11,17 +11,17 @@ pub struct Failure {
 
 impl Failure {
     /// The work was understood but failed: exit code 1.
-    pub fn failed(error: impl Into<anyhow::Error>) -> Self {
+    pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Self {
         Self { code: 1, error: error.into() }
     }
 
     /// Wrong usage or unreadable input: exit code 2.
-    pub fn unusable(error: impl Into<anyhow::Error>) -> Self {
+    pub(crate) fn unusable(error: impl Into<anyhow::Error>) -> Self {
         Self { code: 2, error: error.into() }
     }
 
     /// The exit code.
-    pub fn exit_code(&self) -> u8 {
+    pub(crate) fn exit_code(&self) -> u8 {
         self.code
     }
 }

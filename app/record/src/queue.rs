@@ -137,7 +137,7 @@ impl Queue {
 
     /// Entries that wait.
     #[cfg(test)]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         let state = self.state();
         state.lasting.iter().count() + state.lanes.iter().map(|lane| lane.waiting.len()).sum::<usize>()
     }

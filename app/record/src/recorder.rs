@@ -62,7 +62,7 @@ pub struct Recorder {
 
 impl Recorder {
     /// Records nothing.
-    pub fn off() -> Self {
+    pub(crate) fn off() -> Self {
         Self { shared: None }
     }
 
@@ -94,7 +94,7 @@ impl Recorder {
     }
 
     /// Opens a viewer; how that goes is reported.
-    pub fn open(&self, request: ViewerRequest) {
+    pub(crate) fn open(&self, request: ViewerRequest) {
         if let Some(shared) = &self.shared {
             viewer::open(shared, request);
         }

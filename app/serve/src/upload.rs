@@ -82,7 +82,7 @@ impl Drop for Coming<'_> {
 
 /// Why a file was not taken.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
-pub enum UploadError {
+pub(crate) enum UploadError {
     /// The path leads elsewhere or is none.
     #[error("the name of a file may not lead out of its folder")]
     Name,

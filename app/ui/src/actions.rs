@@ -30,7 +30,7 @@ pub enum Group {
 
 impl Group {
     /// For people.
-    pub fn name(self, language: Language) -> &'static str {
+    pub(crate) fn name(self, language: Language) -> &'static str {
         match self {
             Self::Work => tr!(language, "Robot and captures"),
             Self::Session => tr!(language, "Session"),
@@ -296,7 +296,7 @@ fn window(model: &Model, language: Language) -> Vec<Action> {
 }
 
 /// The keys of an action as people write them.
-pub fn keys_text(ctx: &egui::Context, action: &Action) -> Vec<String> {
+pub(crate) fn keys_text(ctx: &egui::Context, action: &Action) -> Vec<String> {
     let names = egui::ModifierNames::NAMES;
     let is_mac = ctx.os().is_mac();
     action

@@ -30,7 +30,7 @@ fn id() -> Id {
 }
 
 /// What is written on it, and its colours: whoever presses it has to know whether it can act.
-pub struct Face {
+pub(crate) struct Face {
     /// There is a connection to the arm.
     pub can_act: bool,
     /// The words.
@@ -71,7 +71,7 @@ impl Face {
 }
 
 /// A button that stops the arm.
-pub fn stop_button_ui(ui: &mut Ui, button: Button<'_>) -> Response {
+pub(crate) fn stop_button_ui(ui: &mut Ui, button: Button<'_>) -> Response {
     let response = ui.add(button);
     let rect = response.interact_rect.intersect(ui.clip_rect());
     let is_covered = |layer: LayerId| layer != ui.layer_id();

@@ -3,7 +3,7 @@
 use egui::{Event, ImeEvent, RawInput};
 
 /// Longest text that is typed or pasted within a frame \[letters\]: as long as the longest path.
-pub const MOST_TYPED: usize = 4096;
+pub(crate) const MOST_TYPED: usize = 4096;
 
 /// Cuts what is typed and pasted.
 pub fn bound(input: &mut RawInput) {

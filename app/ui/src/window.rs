@@ -59,7 +59,7 @@ impl Remembered {
     }
 
     /// Settings with what is remembered here.
-    pub fn view(&self, settings: ViewSettings) -> ViewSettings {
+    pub(crate) fn view(&self, settings: ViewSettings) -> ViewSettings {
         let Self { overlays, jog, capture, goal, recent: _ } = self;
         ViewSettings { overlays: *overlays, jog: *jog, capture: *capture, goal: *goal, ..settings }
     }
@@ -110,7 +110,7 @@ impl Window {
     /// Closes when a signal asks for it.
     #[cfg(feature = "window")]
     #[must_use]
-    pub fn that_heeds(self, signals: Arc<Signals>) -> Self {
+    pub(crate) fn that_heeds(self, signals: Arc<Signals>) -> Self {
         signals.lead_to(Arc::clone(self.app.stop_line()), Arc::clone(self.app.waker()));
         Self { signals: Some(signals), ..self }
     }
@@ -261,19 +261,19 @@ impl Window {
 
     /// The application.
     #[cfg(test)]
-    pub fn app(&mut self) -> &mut App {
+    pub(crate) fn app(&mut self) -> &mut App {
         &mut self.app
     }
 
     /// Where the panes are.
     #[cfg(test)]
-    pub fn layout(&mut self) -> &mut Layout {
+    pub(crate) fn layout(&mut self) -> &mut Layout {
         &mut self.layout
     }
 
     /// How many frames went to the graphics card.
     #[cfg(test)]
-    pub fn uploads(&self) -> u64 {
+    pub(crate) fn uploads(&self) -> u64 {
         self.textures.live.uploads()
     }
 }

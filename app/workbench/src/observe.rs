@@ -135,7 +135,7 @@ pub fn depth_plane(
 ///
 /// # Errors
 /// [`ObserveError::OtherChessboard`], [`ObserveError::Vision`], [`ObserveError::Cancelled`].
-pub fn observe_images(
+pub(crate) fn observe_images(
     images: &[PathBuf],
     target: &TargetSpec,
     progress: Progress<'_>,
@@ -150,7 +150,7 @@ pub fn observe_images(
 ///
 /// # Errors
 /// [`ObserveError::Vision`], [`ObserveError::Cancelled`].
-pub fn chessboards_in_sight(
+pub(crate) fn chessboards_in_sight(
     images: &[PathBuf],
     progress: Progress<'_>,
     cancel: &CancelToken,

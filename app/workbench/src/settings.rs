@@ -22,7 +22,7 @@ use handeye_wording::text;
 pub const FOLDER: &str = "handeye-workbench";
 
 /// Earlier addresses that are kept.
-pub const ADDRESSES: usize = 8;
+pub(crate) const ADDRESSES: usize = 8;
 
 /// The settings: each field is a key of the file and, in capitals after `HANDEYE_`, a variable of the environment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -108,7 +108,7 @@ impl Settings {
     }
 
     /// Takes in a file. What cannot be used is left as it was and told.
-    pub fn read(&mut self, file: &str, content: &str) -> Vec<Warning> {
+    pub(crate) fn read(&mut self, file: &str, content: &str) -> Vec<Warning> {
         let (table, errors) = DeTable::parse_recoverable(content);
         let mut warnings: Vec<_> = errors
             .into_iter()
@@ -133,7 +133,7 @@ impl Settings {
     }
 
     /// Takes in the environment, given as a function that looks a variable up.
-    pub fn read_environment(&mut self, variable: impl Fn(&str) -> Option<String>) -> Vec<Warning> {
+    pub(crate) fn read_environment(&mut self, variable: impl Fn(&str) -> Option<String>) -> Vec<Warning> {
         let mut warnings = Vec::new();
         // A list cannot stand in a variable.
         for (key, _) in self.table().into_iter().filter(|(_, value)| value.is_str()) {

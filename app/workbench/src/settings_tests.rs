@@ -136,7 +136,7 @@ fn a_file_that_cannot_be_written_is_told() {
     let blocked = folder.path().join("file");
     std::fs::write(&blocked, "").expect("written");
     let (mut file, settings, _) = SettingsFile::open(Some(blocked.join("settings.toml")), nothing);
-    let view = ViewSettings { theme: settings.theme.other(), ..settings.view() };
+    let view = ViewSettings { theme: ThemeChoice::Light, ..settings.view() };
     let Err(Warning(text)) = write(file.keep(view, &[], &[], &CellPaths::default())) else { panic!("it went well") };
     assert!(text.in_language(Language::English).contains("settings.toml"));
 }

@@ -19,7 +19,7 @@ pub struct DhRow {
 
 impl DhRow {
     /// From `[a, alpha, d, theta]`, metres and radians.
-    pub const fn new([a_m, alpha_rad, d_m, theta_offset_rad]: [f64; 4]) -> Self {
+    pub(crate) const fn new([a_m, alpha_rad, d_m, theta_offset_rad]: [f64; 4]) -> Self {
         Self { a_m, alpha_rad, d_m, theta_offset_rad }
     }
 

@@ -30,7 +30,7 @@ struct DepthSum {
 
 impl Average {
     /// Begins with an image, and a depth where there is one; `far_plane_m` as in [`DepthImage::sample`].
-    pub fn begin(rgb: &RgbImage, depth: Option<&DepthImage>, far_plane_m: f32) -> Self {
+    pub(crate) fn begin(rgb: &RgbImage, depth: Option<&DepthImage>, far_plane_m: f32) -> Self {
         let none = DepthSum { metres: 0.0, count: 0, hole: f32::NAN, hole_is_far: false };
         let mut average = Self {
             frames: 0,
@@ -44,12 +44,12 @@ impl Average {
     }
 
     /// Images in it.
-    pub fn frames(&self) -> u32 {
+    pub(crate) fn frames(&self) -> u32 {
         self.frames
     }
 
     /// Adds an image with its depth; `false`, and nothing happens, when their sizes are others or only some have a depth.
-    pub fn add(&mut self, rgb: &RgbImage, depth: Option<&DepthImage>, far_plane_m: f32) -> bool {
+    pub(crate) fn add(&mut self, rgb: &RgbImage, depth: Option<&DepthImage>, far_plane_m: f32) -> bool {
         let depth_size = depth.map(|depth| (depth.width, depth.height));
         let samples = depth.map_or(&[][..], |depth| &depth.metres);
         if (rgb.dimensions(), depth_size, samples.len()) != (self.size, self.depth_size, self.depths.len()) {
@@ -74,7 +74,7 @@ impl Average {
     }
 
     /// The mean.
-    pub fn finish(&self) -> (RgbImage, Option<DepthImage>) {
+    pub(crate) fn finish(&self) -> (RgbImage, Option<DepthImage>) {
         let frames = self.frames.max(1);
         let levels = self.colours.iter().map(|sum| (sum.saturating_add(frames / 2) / frames) as u8).collect();
         // The length is that of an image of this size; an empty image stands for none.

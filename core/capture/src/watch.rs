@@ -100,7 +100,7 @@ struct Sample {
 impl Watch {
     /// Takes in an image. One that is not later than the last by enough changes nothing; one that is earlier begins
     /// again, as the simulation has.
-    pub fn see(&mut self, shot: &Shot<'_>) -> Rest {
+    pub(crate) fn see(&mut self, shot: &Shot<'_>) -> Rest {
         if !shot.sim_time_s.is_finite() {
             return self.rest.unwrap_or(Rest::Unknown);
         }

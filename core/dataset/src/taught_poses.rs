@@ -128,7 +128,7 @@ const SAME_TIP_M: f64 = 1e-3;
 
 impl TaughtOn {
     /// Whether both are the same cell: the same arm at the same base before the same target.
-    pub fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         let near = |a: &[f64], b: &[f64], most: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most);
         let both = |a: Option<&[f64]>, b: Option<&[f64]>, most: f64| match (a, b) {
             (Some(a), Some(b)) => near(a, b, most),
@@ -199,12 +199,7 @@ fn place(file: &Path, row: Option<usize>, pose: Option<&str>) -> Text {
     }
 }
 
-impl PosesError {
-    /// Whether the file that was to be read is at fault, and not the disk that was to be written: exit code 2.
-    pub fn is_bad_input(&self) -> bool {
-        !matches!(self.problem, PosesProblem::Unwritable(_))
-    }
-}
+impl PosesError {}
 
 /// A defect of a pose file.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]
@@ -332,7 +327,7 @@ impl TaughtPoses {
     }
 
     /// The file as text, with every digit that a number has; what is written here, [`Self::parse`] reads again.
-    pub fn to_toml(&self) -> String {
+    pub(crate) fn to_toml(&self) -> String {
         let mut text = format!(
             "# Taught poses: metres, degrees, quaternions x y z w.\nformat = \"{FORMAT}\"\nversion = {VERSION}\n"
         );

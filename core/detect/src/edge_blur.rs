@@ -43,7 +43,7 @@ impl EdgeBlur {
     /// and columns of pixels, larger ones end at a fifth of the square.
     ///
     /// `None` when fewer than three edges of either direction can be measured: squares of less than 5 px, no contrast.
-    pub fn measure(grey: &GrayImage, corners: &[Corner], grid: &Grid) -> Option<Self> {
+    pub(crate) fn measure(grey: &GrayImage, corners: &[Corner], grid: &Grid) -> Option<Self> {
         let mut at = vec![None; grid.len()];
         for corner in corners {
             *at.get_mut(corner.index)? = Some(corner.px);

@@ -77,7 +77,7 @@ impl ArmFit {
 
     /// Covariance of `[mount_from_camera (6), anchor_from_target (6), errors of the arm]`, metres and radians; right perturbations. The
     /// uncertainty of the lens and of everything else that is estimated is in it.
-    pub fn links_and_errors_covariance(&self) -> DMatrix<f64> {
+    pub(crate) fn links_and_errors_covariance(&self) -> DMatrix<f64> {
         let (count, first) = self.error_places();
         let kept: Vec<usize> = (0..12).chain(first..first + count).collect();
         self.covariance.select_rows(&kept).select_columns(&kept)

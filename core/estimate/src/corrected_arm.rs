@@ -127,7 +127,7 @@ impl CorrectedArm {
     ///
     /// # Errors
     /// As [`Arm::forward`].
-    pub fn tip_covariance(&self, joints_rad: &[f64]) -> Result<Matrix6<f64>, ArmError> {
+    pub(crate) fn tip_covariance(&self, joints_rad: &[f64]) -> Result<Matrix6<f64>, ArmError> {
         let by_errors = self.tip_at(joints_rad)?.by_errors;
         let known = &by_errors * &self.covariance * by_errors.transpose();
         let (m, rad) = (self.unexplained.0.powi(2), self.unexplained.1.powi(2));

@@ -203,7 +203,7 @@ pub struct DepthsInFit {
 
 impl DepthsInFit {
     /// How they count, where the answer uses them.
-    pub fn weight(&self) -> Option<DepthWeight> {
+    pub(crate) fn weight(&self) -> Option<DepthWeight> {
         self.accepted.then_some(self.weight)
     }
 }
@@ -354,7 +354,7 @@ impl Fit {
     }
 
     /// Standard deviation of `ln(fx / fy)` of an estimated lens. fx and fy err alike, so it is smaller than theirs.
-    pub fn aspect_sigma(&self) -> Option<f64> {
+    pub(crate) fn aspect_sigma(&self) -> Option<f64> {
         let camera = self.camera.filter(|camera| !camera.fixed)?;
         let Some(joint) = self.joint.as_ref().filter(|joint| joint.free.intrinsics) else {
             return self.camera_fit?.aspect_sigma;

@@ -136,7 +136,7 @@ impl Placement {
     ///
     /// # Errors
     /// [`PlacementError::Foreign`] names the view that is off most.
-    pub fn check(&self) -> Result<(), PlacementError> {
+    pub(crate) fn check(&self) -> Result<(), PlacementError> {
         // In units of the limits, so that both count; NaN is off.
         let excess = |miss: &(f64, f64)| (miss.0 / DISTANCE_LIMIT_M).max(miss.1 / ROTATION_LIMIT_RAD);
         let is_off = |miss: &&(f64, f64)| !(0.0..=1.0).contains(&excess(miss));

@@ -86,7 +86,7 @@ pub struct ReachErrors {
 impl ReachErrors {
     /// Of an answer that something else moves as far, metres.
     #[must_use]
-    pub fn moved_by(self, moved_m: f64) -> Self {
+    pub(crate) fn moved_by(self, moved_m: f64) -> Self {
         Self {
             as_it_is_95_m: self.as_it_is_95_m + moved_m,
             corrected_95_m: self.corrected_95_m.map(|corrected_m| corrected_m + moved_m),
@@ -176,7 +176,7 @@ impl Reach {
     /// Of a session whose arm is known; `answer` is the calibration by reported poses, `tool` where the tip of the tool is in the frame
     /// of the tip, metres, and `is_corrected` whether commands can be corrected, as is so where the reported poses are those of the
     /// chain. `None` without views, and for a covariance that is none.
-    pub fn new(
+    pub(crate) fn new(
         (arm, fit): (&CorrectedArm, &ArmFit),
         answer: &HandEye,
         views: Vec<Seen>,
@@ -207,7 +207,7 @@ impl Reach {
     }
 
     /// At points of the target where it was seen; `None` where too few touches are in reach.
-    pub fn at_target(&self) -> Option<ReachErrors> {
+    pub(crate) fn at_target(&self) -> Option<ReachErrors> {
         let points = self.target.points();
         let seen = |view: usize, random: &mut Draw| {
             self.views[view].camera_from_target.isometry() * points[random.below(points.len())]
@@ -217,7 +217,7 @@ impl Reach {
 
     /// At points in the coordinates of a camera beside the arm, metres: the largest of the errors of those that are in reach. `None` where
     /// none is, and with a camera on the arm, from whose views a point of the camera is in as many places.
-    pub fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
+    pub(crate) fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
         let points = in_camera.iter().filter(|_| self.stands_still());
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
@@ -234,12 +234,12 @@ impl Reach {
     }
 
     /// Whether the camera is beside the arm.
-    pub fn stands_still(&self) -> bool {
+    pub(crate) fn stands_still(&self) -> bool {
         self.corrected.hand_eye.mode() == Mode::EyeToHand
     }
 
     /// Length of the tool, metres.
-    pub fn tool_length_m(&self) -> f64 {
+    pub(crate) fn tool_length_m(&self) -> f64 {
         self.tool.norm()
     }
 
@@ -259,7 +259,7 @@ impl Reach {
     /// How the miss of a touch by corrected commands turns with what is not known: the mean over touches of `Jᵀ J`, with `J` the
     /// derivatives of the vector from the point to the tip of the tool by `[mount_from_camera (6), errors of the arm]`, metres and
     /// radians, the errors in the order of [`ArmErrors::numbers`]. Of touches at the target, or at points in camera coordinates. `None` where too few touches are in reach.
-    pub fn weight(&self, in_camera: Option<&[Point3<f64>]>) -> Option<DMatrix<f64>> {
+    pub(crate) fn weight(&self, in_camera: Option<&[Point3<f64>]>) -> Option<DMatrix<f64>> {
         let target = self.target.points();
         if in_camera.map_or(target.is_empty(), <[Point3<f64>]>::is_empty) {
             return None;

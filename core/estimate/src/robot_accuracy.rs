@@ -31,7 +31,7 @@ use handeye_geometry::targets::TargetSpec;
 
 /// Turn of the tip in radians for each metre that it is off, root mean square each: of a recorded UR5e, whose nominal chain is 0.41 mm
 /// and 0.145° off its controller's. Of 17 factory calibrations it is 2 to 4.
-pub const TURN_PER_M: f64 = 6.0;
+pub(crate) const TURN_PER_M: f64 = 6.0;
 
 /// Accuracies that a robot may be given, millimetres: from less than any arm has to a robot that is better calibrated first.
 pub const ROBOT_ACCURACY_MM: RangeInclusive<f64> = 0.001..=100.0;
@@ -108,25 +108,25 @@ impl ReachByAccuracy {
     }
 
     /// At points of the target where it was seen.
-    pub fn at_target(&self) -> Option<ReachErrors> {
+    pub(crate) fn at_target(&self) -> Option<ReachErrors> {
         let points = self.target.points();
         let seen = |view: usize, random: &mut Draw| self.views[view].isometry() * points[random.below(points.len())];
         if points.is_empty() { None } else { self.errors(seen) }
     }
 
     /// At points in the coordinates of a camera beside the arm, metres: the largest of their errors. `None` with a camera on the arm.
-    pub fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
+    pub(crate) fn at_points(&self, in_camera: &[Point3<f64>]) -> Option<ReachErrors> {
         let points = in_camera.iter().filter(|_| self.stands_still());
         points.filter_map(|point| self.errors(|_, _| *point)).reduce(ReachErrors::worse)
     }
 
     /// Whether the camera is beside the arm.
-    pub fn stands_still(&self) -> bool {
+    pub(crate) fn stands_still(&self) -> bool {
         self.hand_eye.mode() == Mode::EyeToHand
     }
 
     /// What was said of the robot and its tool.
-    pub fn accuracy(&self) -> &RobotAccuracy {
+    pub(crate) fn accuracy(&self) -> &RobotAccuracy {
         &self.accuracy
     }
 

@@ -32,7 +32,7 @@ impl TargetSize {
     }
 
     /// Whether the stated size is ruled out.
-    pub fn is_another(&self) -> bool {
+    pub(crate) fn is_another(&self) -> bool {
         (self.scale - 1.0).abs() > self.found_from()
     }
 

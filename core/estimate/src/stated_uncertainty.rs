@@ -36,7 +36,7 @@ pub struct Alternative {
 
 impl Alternative {
     /// How far it moves a `point` (camera coordinates, metres), metres.
-    pub fn moved_m(&self, point: &Point3<f64>) -> f64 {
+    pub(crate) fn moved_m(&self, point: &Point3<f64>) -> f64 {
         self.moved(point).norm()
     }
 
@@ -68,7 +68,7 @@ impl Alternative {
     }
 
     /// Mean square of the error of the answer as it is where this is the truth, `[t; r]`.
-    pub fn mean_square(&self) -> Matrix6<f64> {
+    pub(crate) fn mean_square(&self) -> Matrix6<f64> {
         self.covariance + self.shift * self.shift.transpose()
     }
 }
@@ -101,7 +101,12 @@ impl StatedUncertainty {
     }
 
     /// The two parts of that error: how far the explanation that makes it largest would move the point, and what remains.
-    pub fn parts_95_m(&self, covariance: &Matrix6<f64>, law: SmallSample, point: &Point3<f64>) -> Option<(f64, f64)> {
+    pub(crate) fn parts_95_m(
+        &self,
+        covariance: &Matrix6<f64>,
+        law: SmallSample,
+        point: &Point3<f64>,
+    ) -> Option<(f64, f64)> {
         let modelled = tip_error_95_at(covariance, law, point);
         match self {
             Self::AsModelled => Some((0.0, modelled)),

@@ -41,7 +41,7 @@ impl Estimated for Session {
 }
 
 /// What is off about the links of a usual arm, by another convention than the estimator's: `a`, `d` \[m\], `alpha`, zero \[rad\].
-pub const OFF_LINKS: [[f64; 4]; 6] = [
+pub(crate) const OFF_LINKS: [[f64; 4]; 6] = [
     [1e-4, -2e-4, 4e-4, 0.0],
     [-3e-4, 0.0, -9e-4, 1.2e-3],
     [4e-4, 1e-4, 6e-4, -8e-4],

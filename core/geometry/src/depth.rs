@@ -211,9 +211,9 @@ impl DepthImage {
 }
 
 /// Colour of pixels without measurement: magenta, which no map contains.
-pub const INVALID_COLOUR: [u8; 3] = [255, 0, 255];
+pub(crate) const INVALID_COLOUR: [u8; 3] = [255, 0, 255];
 /// Colour of pixels at the far plane: a dark blue-grey outside all maps.
-pub const FAR_COLOUR: [u8; 3] = [24, 28, 40];
+pub(crate) const FAR_COLOUR: [u8; 3] = [24, 28, 40];
 
 /// How far depths may be off the surface that the others are on, by the sizes of how far they are, metres.
 pub fn outlier_reach_m(off_m: &[f64]) -> f64 {

@@ -65,7 +65,7 @@ pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Inverse of [`left_jacobian`], defined for angles below 2π.
-pub fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle_sq = phi.norm_squared();
     let angle = angle_sq.sqrt();
     let k = skew(phi);
@@ -92,7 +92,7 @@ pub fn adjoint(pose: &Isometry3<f64>) -> Matrix6<f64> {
 ///
 /// `None` when the input is empty.
 /// Reference: Markley, Cheng, Crassidis, Oshman 2007, "Averaging quaternions", eq. 12.
-pub fn mean_rotation(rotations: impl IntoIterator<Item = UnitQuaternion<f64>>) -> Option<UnitQuaternion<f64>> {
+pub(crate) fn mean_rotation(rotations: impl IntoIterator<Item = UnitQuaternion<f64>>) -> Option<UnitQuaternion<f64>> {
     let mut sum = nalgebra::Matrix4::zeros();
     let mut count = 0usize;
     for rotation in rotations {

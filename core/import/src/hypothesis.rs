@@ -72,13 +72,13 @@ impl Hypothesis {
     }
 
     /// The pose of the target in the camera that a sample means, metres; `None` with images.
-    pub fn camera_from_target(&self, sample: &Sample) -> Option<Isometry3<f64>> {
+    pub(crate) fn camera_from_target(&self, sample: &Sample) -> Option<Isometry3<f64>> {
         let (reading, direction) = self.target_reading?;
         Some(direction.of(&reading.transform(&sample.numbers)?))
     }
 
     /// The series that the poses of the target come from; `None` with images.
-    pub fn target_series<'a>(&self, recording: &'a Recording) -> Option<&'a str> {
+    pub(crate) fn target_series<'a>(&self, recording: &'a Recording) -> Option<&'a str> {
         match self.source {
             Source::Track(i) => recording.tracks.get(i).map(|track| track.name.as_str()),
             Source::Stream(_) => None,
@@ -86,7 +86,7 @@ impl Hypothesis {
     }
 
     /// Where the camera sits, as `--set mode=` has it.
-    pub fn mode_name(&self) -> &'static str {
+    pub(crate) fn mode_name(&self) -> &'static str {
         match self.mode {
             Mode::EyeInHand => "eye_in_hand",
             Mode::EyeToHand => "eye_to_hand",

@@ -26,12 +26,12 @@ impl Pairing {
     }
 
     /// Poses that have an image.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.image_of.iter().flatten().count()
     }
 
     /// Images that no pose has.
-    pub fn without_pose(&self, images: usize) -> Vec<usize> {
+    pub(crate) fn without_pose(&self, images: usize) -> Vec<usize> {
         (0..images).filter(|image| !self.image_of.contains(&Some(*image))).collect()
     }
 }

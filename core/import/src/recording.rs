@@ -168,7 +168,7 @@ pub struct Track {
 
 impl Track {
     /// Whether all its poses are the same numbers: a setting, or a robot that did not move.
-    pub fn is_still(&self) -> bool {
+    pub(crate) fn is_still(&self) -> bool {
         self.samples.windows(2).all(|pair| pair[0].numbers == pair[1].numbers)
     }
 
@@ -222,7 +222,7 @@ pub struct JointSeries {
 
 impl JointSeries {
     /// What it is, in words.
-    pub fn text(&self) -> Text {
+    pub(crate) fn text(&self) -> Text {
         let names = if self.joints.is_empty() { String::new() } else { format!(" ({})", self.joints.join(", ")) };
         text!(
             "{count} rows of joint values in {name}{names}: arm=… makes poses of them",
@@ -315,7 +315,7 @@ pub struct Known<T> {
 
 impl<T> Known<T> {
     /// By whom.
-    pub fn by(why: impl Into<String>, value: T) -> Self {
+    pub(crate) fn by(why: impl Into<String>, value: T) -> Self {
         Self { value, why: why.into() }
     }
 }
@@ -333,7 +333,7 @@ pub struct FoundMode {
 
 impl FoundMode {
     /// Who says so.
-    pub fn why(&self) -> Text {
+    pub(crate) fn why(&self) -> Text {
         text!("{key} in {file}", key = self.key, file = &self.file)
     }
 }
@@ -351,7 +351,7 @@ pub struct FoundTarget {
 
 impl FoundTarget {
     /// What it is, in words.
-    pub fn text(&self) -> Text {
+    pub(crate) fn text(&self) -> Text {
         let open = if self.is_id_open { text!(", which number of its family is not said") } else { Text::default() };
         text!("a target in {file}: {target}{open}", file = &self.file, target = self.target.text(), open = open)
     }
@@ -370,7 +370,7 @@ pub struct FoundCamera {
 
 impl FoundCamera {
     /// What it is, in words.
-    pub fn text(&self) -> Text {
+    pub(crate) fn text(&self) -> Text {
         text!("a camera in {file}: {why}", file = &self.name, why = Value::phrase(self.why))
     }
 }

@@ -82,7 +82,7 @@ impl Sight {
     }
 
     /// From recorded poses of the target, metres.
-    pub fn of_poses(target: Option<&TargetSpec>, seen: Vec<Option<Isometry3<f64>>>) -> Self {
+    pub(crate) fn of_poses(target: Option<&TargetSpec>, seen: Vec<Option<Isometry3<f64>>>) -> Self {
         // Without a target points at arm's length of a hand around its origin say how far poses are apart.
         const REACH_M: f64 = 0.05;
         let outer = match target {

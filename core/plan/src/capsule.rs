@@ -23,23 +23,23 @@ pub struct Capsule {
 impl Capsule {
     /// The same in another frame.
     #[must_use]
-    pub fn moved(&self, to_frame: &Isometry3<f64>) -> Self {
+    pub(crate) fn moved(&self, to_frame: &Isometry3<f64>) -> Self {
         Self { from: to_frame * self.from, to: to_frame * self.to, radius_m: self.radius_m }
     }
 
     /// Between its ends, metres.
-    pub fn length_m(&self) -> f64 {
+    pub(crate) fn length_m(&self) -> f64 {
         (self.to - self.from).norm()
     }
 
     /// Distance of the surfaces, metres; below zero where they overlap.
-    pub fn distance_to(&self, other: &Self) -> f64 {
+    pub(crate) fn distance_to(&self, other: &Self) -> f64 {
         segment_distance([self.from, self.to], [other.from, other.to]) - self.radius_m - other.radius_m
     }
 
     /// Distance from a box, metres, with the capsule in the base; below zero where they overlap, by how far the capsule is in
     /// it. To a millimetre for a link of a metre, and never too small by more than rounding.
-    pub fn distance_to_box(&self, obstacle: &Obstacle) -> f64 {
+    pub(crate) fn distance_to_box(&self, obstacle: &Obstacle) -> f64 {
         // The distance from something convex is convex along a line, so its least value is found by sections.
         let at = |part: f64| obstacle.distance_to(&(self.from + (self.to - self.from) * part));
         let (mut low, mut high) = (0.0, 1.0);
@@ -63,7 +63,7 @@ impl Capsule {
     }
 
     /// Less than [`Self::distance_to_box`] by no more than the length, from one look: most boxes are far away.
-    pub fn at_least_from_box(&self, obstacle: &Obstacle) -> f64 {
+    pub(crate) fn at_least_from_box(&self, obstacle: &Obstacle) -> f64 {
         let middle = nalgebra::center(&self.from, &self.to);
         obstacle.distance_to(&middle) - 0.5 * self.length_m() - self.radius_m
     }

@@ -40,7 +40,7 @@ impl Carried {
     }
 
     /// A board with the whole of its sheet, and as much room about it as it may be from where it is taken to be, metres.
-    pub fn board(target: &TargetSpec, tip_from_target: &Pose<Tip, Target>, room_m: f64) -> Self {
+    pub(crate) fn board(target: &TargetSpec, tip_from_target: &Pose<Tip, Target>, room_m: f64) -> Self {
         let (centre, extent, square_m) = (target.centre(), target.extent(), target.grid().square_m);
         let edges_m = [extent.x, extent.y].map(|points_m| points_m + 2.0 * SHEET_EDGE_SQUARES * square_m);
         let (long, short) = if edges_m[0] >= edges_m[1] { (0, 1) } else { (1, 0) };

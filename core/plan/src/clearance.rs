@@ -103,7 +103,7 @@ impl Arm {
 
     /// Its joints in a view from there, as [`View::tip_from_joints`](handeye_geometry::targets::observation::View::tip_from_joints),
     /// where it gets there from `seed` on; empty where it does not.
-    pub fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Vec<Isometry3<f64>> {
+    pub(crate) fn tip_from_joints(&self, base_from_tip: &Pose<Base, Tip>, seed: &[f64]) -> Vec<Isometry3<f64>> {
         let joints = self.chain.inverse_nearby(&self.arm_from_connection(base_from_tip), seed);
         let Some(joints) = joints else { return Vec::new() };
         let arm_from_tip = Pose::from_isometry(self.world_from_arm.inverse() * base_from_tip.isometry());

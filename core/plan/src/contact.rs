@@ -204,7 +204,7 @@ impl Arm {
     }
 
     /// Whether the straight path in joint space between two configurations touches nothing; its ends are not looked at.
-    pub fn path_is_free(&self, from: &[f64], to: &[f64], around: &Surroundings, clearance_m: f64) -> bool {
+    pub(crate) fn path_is_free(&self, from: &[f64], to: &[f64], around: &Surroundings, clearance_m: f64) -> bool {
         Guard::strict(self, around, clearance_m).contact_on_path(from, to).is_none()
     }
 

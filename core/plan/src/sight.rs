@@ -27,7 +27,7 @@ pub struct Sight {
 
 impl Sight {
     /// By where an estimate has both of them.
-    pub fn new(hand_eye: &HandEye, target: &TargetSpec) -> Self {
+    pub(crate) fn new(hand_eye: &HandEye, target: &TargetSpec) -> Self {
         let (centre, extent) = (target.centre(), target.extent());
         let parts = |extent_m: f64| ((extent_m / PITCH_M).ceil() as usize).clamp(1, MOST - 1);
         let (columns, rows) = (parts(extent.x), parts(extent.y));
@@ -41,7 +41,7 @@ impl Sight {
     }
 
     /// Whether nothing of an arm with these joint values, at which it has its tip there, is between camera and board.
-    pub fn is_free(&self, arm: &Arm, joints: &[f64], base_from_tip: &Pose<Base, Tip>) -> bool {
+    pub(crate) fn is_free(&self, arm: &Arm, joints: &[f64], base_from_tip: &Pose<Base, Tip>) -> bool {
         let Some(filled) = arm.filled(joints) else { return false };
         let tip = base_from_tip.isometry();
         let (base_from_camera, base_from_target) = match &self.hand_eye {

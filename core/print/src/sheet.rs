@@ -148,7 +148,7 @@ impl Sheet {
     }
 
     /// The ticks of both rulers, millimetres. Every tick is centred on its millimetre; a line joins the first and the last.
-    pub fn ruler_shapes(&self) -> Vec<Shape> {
+    pub(crate) fn ruler_shapes(&self) -> Vec<Shape> {
         let mut shapes = Vec::new();
         for (axis, [x, y]) in self.rulers_mm.into_iter().enumerate() {
             let mut add = |along: f64, length: f64, across: f64, depth: f64| {

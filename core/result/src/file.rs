@@ -20,12 +20,7 @@ pub struct ResultError {
     pub problem: ResultProblem,
 }
 
-impl ResultError {
-    /// Whether the file that was to be read is at fault, and not the disk that was to be written: exit code 2.
-    pub fn is_bad_input(&self) -> bool {
-        !matches!(self.problem, ResultProblem::Unwritable(_))
-    }
-}
+impl ResultError {}
 
 /// What is wrong with a result.
 #[derive(Debug, thiserror::Error, handeye_wording::Localized)]

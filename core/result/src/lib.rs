@@ -112,7 +112,7 @@ pub struct TransformEstimate {
 
 impl TransformEstimate {
     /// States a pose, and its covariance where it is known.
-    pub fn new<Parent: Frame, Child: Frame>(
+    pub(crate) fn new<Parent: Frame, Child: Frame>(
         parent_from_child: &Pose<Parent, Child>,
         covariance: Option<&Matrix6<f64>>,
     ) -> Self {
@@ -280,7 +280,7 @@ pub struct MethodRecord {
 
 impl MethodRecord {
     /// A method that found an answer.
-    pub fn solved(name: &str, mount_from_camera: &Pose<Mount, Camera>) -> Self {
+    pub(crate) fn solved(name: &str, mount_from_camera: &Pose<Mount, Camera>) -> Self {
         Self {
             name: name.to_owned(),
             translation_m: Some(mount_from_camera.translation().into()),
@@ -290,7 +290,7 @@ impl MethodRecord {
     }
 
     /// A method that found none.
-    pub fn failed(name: &str, error: &dyn fmt::Display) -> Self {
+    pub(crate) fn failed(name: &str, error: &dyn fmt::Display) -> Self {
         let status = MethodStatus::Failed(error.to_string());
         Self { name: name.to_owned(), translation_m: None, rotation_xyzw: None, status }
     }

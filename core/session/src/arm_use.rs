@@ -17,7 +17,7 @@ impl Document {
     /// # Errors
     /// [`PlacementError`] when the joint angles are of no use: they do not fit the poses with this arm, or the captures do
     /// not determine where it stands.
-    pub fn placement(&self) -> Result<Option<Placement>, PlacementError> {
+    pub(crate) fn placement(&self) -> Result<Option<Placement>, PlacementError> {
         let in_use: Option<Vec<JointView<'_>>> = self.in_use().map(joint_view).collect();
         let (Some(model), Some(in_use)) = (&self.meta.arm, in_use) else { return Ok(None) };
         let (placement, _) = placement::place_checked(&model.arm()?, &in_use)?;
@@ -26,7 +26,7 @@ impl Document {
 
     /// Where the joints are at the tip in the captures, see [`handeye_arm::Arm::tip_from_joints`]. A capture that is excluded or kept
     /// for verification is there when its joint angles belong to its pose.
-    pub fn tip_from_joints(&self, placement: &Placement) -> BTreeMap<CaptureId, Vec<Isometry3<f64>>> {
+    pub(crate) fn tip_from_joints(&self, placement: &Placement) -> BTreeMap<CaptureId, Vec<Isometry3<f64>>> {
         let frames = |capture| placement.tip_from_joints(&joint_view(capture)?).ok();
         self.captures.iter().filter_map(|capture| Some((capture.id, frames(capture)?))).collect()
     }

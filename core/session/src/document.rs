@@ -269,7 +269,7 @@ impl CaptureRecord {
     }
 
     /// Its files, relative to the session.
-    pub fn files(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn files(&self) -> impl Iterator<Item = &str> {
         std::iter::once(self.image.as_str()).chain(self.depth.as_deref())
     }
 

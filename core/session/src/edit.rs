@@ -60,7 +60,7 @@ impl Document {
     /// [`EditError`] when the change does not fit the document, makes it something that cannot be read again, or
     /// leaves it as it is ([`EditError::NoChange`]). Whether a number was used by a capture that is gone is not known
     /// here; [`super::History`] knows.
-    pub fn apply(&self, edit: &Edit) -> Result<Self, EditError> {
+    pub(crate) fn apply(&self, edit: &Edit) -> Result<Self, EditError> {
         let mut next = self.clone();
         match edit {
             Edit::AddCapture(record) => {

@@ -32,11 +32,6 @@ impl SessionError {
     pub fn is_no_change(&self) -> bool {
         matches!(self.problem, SessionProblem::Edit(EditError::NoChange))
     }
-
-    /// Whether what was to be read or used is at fault, and not the disk that was to be written: exit code 2.
-    pub fn is_bad_input(&self) -> bool {
-        !matches!(self.problem, SessionProblem::Unwritable(_) | SessionProblem::Behind(_) | SessionProblem::Broken)
-    }
 }
 
 /// What is wrong with a session.

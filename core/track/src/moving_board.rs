@@ -12,7 +12,7 @@ use handeye_geometry::testing::BOARD;
 pub use handeye_simulate::moving_board::{Cover, FAR_M, Stage, centre, lens};
 
 /// Seconds between images.
-pub const PERIOD_S: f64 = 1.0 / 30.0;
+pub(crate) const PERIOD_S: f64 = 1.0 / 30.0;
 
 /// The tip half a metre above the table, camera down, a little askew.
 pub fn base_from_tip() -> Pose<Base, Tip> {
@@ -53,28 +53,28 @@ pub struct Watch {
 }
 
 impl Watch {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with(setup())
     }
 
-    pub fn with(setup: Setup) -> Self {
+    pub(crate) fn with(setup: Setup) -> Self {
         let tracker = Tracker::new(setup).expect("a good set-up");
         Self { stage: Stage::new(), tracker, time_s: 0.0, seed: 1, base_from_tip: base_from_tip() }
     }
 
-    pub fn camera_from_target(&self, base_from_target: &Pose<Base, Target>) -> Isometry3<f64> {
+    pub(crate) fn camera_from_target(&self, base_from_target: &Pose<Base, Target>) -> Isometry3<f64> {
         let base_from_camera = self.tracker.setup().calibrated.base_from_camera(&self.base_from_tip);
         *(base_from_camera.inverse() * *base_from_target).isometry()
     }
 
     /// The next image, with the board there or with none.
-    pub fn see(&mut self, board: Option<&Pose<Base, Target>>) -> Update {
+    pub(crate) fn see(&mut self, board: Option<&Pose<Base, Target>>) -> Update {
         let board = board.map(|b| self.camera_from_target(b));
         let grey = self.stage.image(board.as_ref(), self.seed);
         self.show(&grey, None)
     }
 
-    pub fn show(&mut self, grey: &GrayImage, depth: Option<&DepthImage>) -> Update {
+    pub(crate) fn show(&mut self, grey: &GrayImage, depth: Option<&DepthImage>) -> Update {
         self.time_s += PERIOD_S;
         self.seed += 1;
         let (time_s, base_from_tip) = (self.time_s, self.base_from_tip);

@@ -86,7 +86,7 @@ impl Tracker {
     }
 
     /// Forgets every image.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.filter = None;
         self.elsewhere = None;
         self.believed_s = None;

@@ -7,7 +7,7 @@ use handeye_arm::{Arm, ArmKind, links};
 use handeye_render::{Finish, Shape, Solid};
 
 /// Turned aluminium of tubes and housings.
-pub const ALUMINIUM: [f32; 3] = [0.76, 0.78, 0.80];
+pub(crate) const ALUMINIUM: [f32; 3] = [0.76, 0.78, 0.80];
 /// The darker tone of base, wrists and gripper.
 pub const GRAPHITE: [f32; 3] = [0.25, 0.27, 0.30];
 /// Covers of the joints.
@@ -106,7 +106,7 @@ pub fn link_parts(arm: &Arm) -> Vec<(usize, Solid)> {
 }
 
 /// The cylinder from `a` to `b` and the pose of its frame.
-pub fn cylinder_between(a: &Point3<f64>, b: &Point3<f64>, radius: f64) -> (Shape, Isometry3<f64>) {
+pub(crate) fn cylinder_between(a: &Point3<f64>, b: &Point3<f64>, radius: f64) -> (Shape, Isometry3<f64>) {
     let axis = b - a;
     // Opposite to z any axis across will do for the half turn.
     let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &axis)

@@ -105,12 +105,12 @@ impl Connection {
     }
 
     /// Where the server is.
-    pub fn endpoint(&self) -> &Endpoint {
+    pub(crate) fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
     /// Longest duration of a call that has no limit of its own.
-    pub fn total_timeout(&self) -> Duration {
+    pub(crate) fn total_timeout(&self) -> Duration {
         self.options.total_timeout
     }
 

@@ -3,7 +3,6 @@
 //! | CoppeliaSim | here |
 //! | --- | --- |
 //! | pose `[x y z qx qy qz qw]` | [`Pose`] |
-//! | matrix, 3×4, row by row: `[R | p]` | [`Pose`] |
 //! | image rows from the bottom up | row 0 on top |
 //! | depth as little-endian `f32`, metres along the optical axis, rows from the bottom up | [`DepthImage`], row 0 on top |
 //! | vision sensor axes: x left, y up, z forward | [`Camera`](handeye_geometry::frames::Camera): x right, y down, z forward |
@@ -11,7 +10,6 @@
 use handeye_geometry::depth::DepthImage;
 use handeye_geometry::frames::Pose;
 use image::RgbImage;
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 
 /// How far a rotation may be off (norm of a quaternion, entries of RᵀR) before it is refused. Single precision is
 /// off by 1e-6; a quaternion in another order or scale by far more.
@@ -59,7 +57,7 @@ pub enum ConvertError {
 ///
 /// # Errors
 /// [`ConvertError`] when they are not finite or the quaternion is not a unit one.
-pub fn pose_from_seven<Dst, Src>(v: &[f64; 7]) -> Result<Pose<Dst, Src>, ConvertError> {
+pub(crate) fn pose_from_seven<Dst, Src>(v: &[f64; 7]) -> Result<Pose<Dst, Src>, ConvertError> {
     if v.iter().any(|x| !x.is_finite()) {
         return Err(ConvertError::NotFinite);
     }
@@ -72,35 +70,10 @@ pub fn pose_from_seven<Dst, Src>(v: &[f64; 7]) -> Result<Pose<Dst, Src>, Convert
 }
 
 /// CoppeliaSim's seven numbers for a pose.
-pub fn seven_from_pose<Dst, Src>(pose: &Pose<Dst, Src>) -> [f64; 7] {
+pub(crate) fn seven_from_pose<Dst, Src>(pose: &Pose<Dst, Src>) -> [f64; 7] {
     let t = pose.translation();
     let [qx, qy, qz, qw] = pose.xyzw();
     [t.x, t.y, t.z, qx, qy, qz, qw]
-}
-
-/// A pose from the twelve numbers of a CoppeliaSim matrix.
-///
-/// # Errors
-/// [`ConvertError`] when they are not finite, or the left 3×3 block is no rotation.
-pub fn pose_from_twelve<Dst, Src>(v: &[f64; 12]) -> Result<Pose<Dst, Src>, ConvertError> {
-    if v.iter().any(|x| !x.is_finite()) {
-        return Err(ConvertError::NotFinite);
-    }
-    let [xx, yx, zx, px, xy, yy, zy, py, xz, yz, zz, pz] = *v;
-    let r = Matrix3::new(xx, yx, zx, xy, yy, zy, xz, yz, zz);
-    let off_by = (r.transpose() * r - Matrix3::identity()).amax().max((r.determinant() - 1.0).abs());
-    if off_by > ROTATION_TOLERANCE {
-        return Err(ConvertError::NotARotation { off_by });
-    }
-    let rotation = UnitQuaternion::from_rotation_matrix(&handeye_geometry::se3::nearest_rotation(&r));
-    Ok(Pose::from_isometry(Isometry3::from_parts(Translation3::new(px, py, pz), rotation)))
-}
-
-/// The twelve numbers of a CoppeliaSim matrix for a pose.
-pub fn twelve_from_pose<Dst, Src>(pose: &Pose<Dst, Src>) -> [f64; 12] {
-    let r = pose.rotation().to_rotation_matrix();
-    let t = pose.translation();
-    std::array::from_fn(|i| if i % 4 == 3 { t[i / 4] } else { r[(i / 4, i % 4)] })
 }
 
 /// An image size from two numbers.
@@ -120,7 +93,7 @@ pub fn resolution(width: f64, height: f64) -> Result<(u32, u32), ConvertError> {
 ///
 /// # Errors
 /// [`ConvertError::BufferSize`].
-pub fn rgb_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<RgbImage, ConvertError> {
+pub(crate) fn rgb_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<RgbImage, ConvertError> {
     let flipped = top_row_first(bytes, width, height, 3)?;
     RgbImage::from_raw(width, height, flipped).ok_or(ConvertError::BufferSize {
         got: bytes.len(),
@@ -135,7 +108,7 @@ pub fn rgb_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<RgbImage,
 ///
 /// # Errors
 /// [`ConvertError::BufferSize`].
-pub fn depth_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<DepthImage, ConvertError> {
+pub(crate) fn depth_from_bytes(bytes: &[u8], width: u32, height: u32) -> Result<DepthImage, ConvertError> {
     let flipped = top_row_first(bytes, width, height, 4)?;
     let metres = flipped.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
     Ok(DepthImage { width, height, metres })

@@ -30,7 +30,7 @@ impl Endpoint {
     ///
     /// # Errors
     /// [`BadEndpoint`] when the host is empty or has characters that no host name has, or the port is 0.
-    pub fn new(host: &str, port: u16) -> Result<Self, BadEndpoint> {
+    pub(crate) fn new(host: &str, port: u16) -> Result<Self, BadEndpoint> {
         let bad = |reason| Err(BadEndpoint { text: format!("{host}:{port}"), reason });
         if host.is_empty() {
             return bad("the host is missing");
@@ -47,11 +47,6 @@ impl Endpoint {
     /// Port `port` of this machine.
     pub fn local(port: u16) -> Self {
         Self { host: "127.0.0.1".to_owned(), port }
-    }
-
-    /// Host name or address.
-    pub fn host(&self) -> &str {
-        &self.host
     }
 
     /// TCP port.

@@ -340,7 +340,7 @@ impl LinkError {
     }
 
     /// Whether the server said that the scene has no such object.
-    pub fn is_missing_object(&self) -> bool {
+    pub(crate) fn is_missing_object(&self) -> bool {
         matches!(self, Self::Remote { message, .. } if message.to_lowercase().contains(super::protocol::NO_SUCH_OBJECT))
     }
 
@@ -358,7 +358,7 @@ impl LinkError {
     }
 
     /// Whether the server said that it has no such function.
-    pub fn is_unknown_function(&self) -> bool {
+    pub(crate) fn is_unknown_function(&self) -> bool {
         matches!(self, Self::Remote { message, .. } if message.contains(super::protocol::UNKNOWN_FUNCTION))
     }
 }

@@ -226,7 +226,6 @@ mod slow {
                 let returned = crate::Returned::new("fuzz", values);
                 let _outcome = (returned.number(0), returned.text(0), returned.blob(0), returned.resolution(1));
                 let _outcome = returned.pose::<(), ()>(0);
-                let _outcome = returned.matrix::<(), ()>(0);
                 let _outcome = returned.into_map(0);
             }
         }

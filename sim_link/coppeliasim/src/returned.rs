@@ -28,7 +28,7 @@ impl Returned {
     ///
     /// # Errors
     /// [`LinkError::UnexpectedReply`], as for all readers here, when it cannot be read so.
-    pub fn number(&self, index: usize) -> Result<f64, LinkError> {
+    pub(crate) fn number(&self, index: usize) -> Result<f64, LinkError> {
         self.read(index, "a number", Reader::number)
     }
 
@@ -44,7 +44,7 @@ impl Returned {
     ///
     /// # Errors
     /// As [`Self::number`].
-    pub fn boolean(&self, index: usize) -> Result<bool, LinkError> {
+    pub(crate) fn boolean(&self, index: usize) -> Result<bool, LinkError> {
         self.read(index, "a boolean", |value| value.boolean().or_else(|| value.integer().map(|v| v != 0)))
     }
 
@@ -68,7 +68,7 @@ impl Returned {
     ///
     /// # Errors
     /// As [`Self::number`].
-    pub fn numbers(&self, index: usize) -> Result<Vec<f64>, LinkError> {
+    pub(crate) fn numbers(&self, index: usize) -> Result<Vec<f64>, LinkError> {
         self.read(index, "an array of numbers", Reader::numbers)
     }
 
@@ -76,7 +76,7 @@ impl Returned {
     ///
     /// # Errors
     /// As [`Self::number`], also for another length.
-    pub fn exactly<const N: usize>(&self, index: usize) -> Result<[f64; N], LinkError> {
+    pub(crate) fn exactly<const N: usize>(&self, index: usize) -> Result<[f64; N], LinkError> {
         let numbers = self.numbers(index)?;
         let got = numbers.len();
         <[f64; N]>::try_from(numbers).ok().ok_or_else(|| LinkError::UnexpectedReply {
@@ -90,7 +90,7 @@ impl Returned {
     ///
     /// # Errors
     /// As [`Self::number`].
-    pub fn into_map(mut self, index: usize) -> Result<Value, LinkError> {
+    pub(crate) fn into_map(mut self, index: usize) -> Result<Value, LinkError> {
         match self.values.get_mut(index) {
             Some(value @ Value::Map(_)) => Ok(std::mem::replace(value, Value::Null)),
             _ => Err(self.unexpected(index, "a map")),
@@ -101,23 +101,15 @@ impl Returned {
     ///
     /// # Errors
     /// As [`Self::number`]; [`LinkError::BadValue`] when it is no rigid transform.
-    pub fn pose<Dst, Src>(&self, index: usize) -> Result<Pose<Dst, Src>, LinkError> {
+    pub(crate) fn pose<Dst, Src>(&self, index: usize) -> Result<Pose<Dst, Src>, LinkError> {
         self.checked(convert::pose_from_seven(&self.exactly::<7>(index)?))
-    }
-
-    /// A CoppeliaSim matrix (12 numbers) at `index`, stated to be `dst_from_src`.
-    ///
-    /// # Errors
-    /// As [`Self::pose`].
-    pub fn matrix<Dst, Src>(&self, index: usize) -> Result<Pose<Dst, Src>, LinkError> {
-        self.checked(convert::pose_from_twelve(&self.exactly::<12>(index)?))
     }
 
     /// The image size `[width, height]` at `index`.
     ///
     /// # Errors
     /// As [`Self::number`]; [`LinkError::BadValue`] when it is no size.
-    pub fn resolution(&self, index: usize) -> Result<(u32, u32), LinkError> {
+    pub(crate) fn resolution(&self, index: usize) -> Result<(u32, u32), LinkError> {
         let [width, height] = self.exactly::<2>(index)?;
         self.checked(convert::resolution(width, height))
     }

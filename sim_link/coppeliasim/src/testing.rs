@@ -40,12 +40,12 @@ impl Log {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(event);
     }
 
-    pub fn events(&self) -> Vec<Event> {
+    pub(crate) fn events(&self) -> Vec<Event> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// The requests in order.
-    pub fn requests(&self) -> Vec<Value> {
+    pub(crate) fn requests(&self) -> Vec<Value> {
         let sent = |event| match event {
             Event::Sent(request) => Some(request),
             _ => None,
@@ -54,7 +54,7 @@ impl Log {
     }
 
     /// The functions called, in order.
-    pub fn functions(&self) -> Vec<String> {
+    pub(crate) fn functions(&self) -> Vec<String> {
         self.requests().iter().map(|request| func(request).to_owned()).collect()
     }
 }

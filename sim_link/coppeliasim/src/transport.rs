@@ -115,7 +115,7 @@ impl ZmqTransport {
     ///
     /// # Errors
     /// [`LinkError::Socket`].
-    pub fn open(&mut self) -> Result<(), LinkError> {
+    pub(crate) fn open(&mut self) -> Result<(), LinkError> {
         self.ready().map(|_| ()).map_err(|fault| LinkError::Socket {
             endpoint: self.endpoint.to_string(),
             reason: match fault {

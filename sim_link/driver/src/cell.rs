@@ -107,7 +107,7 @@ impl DriverCell {
     }
 
     /// Ends both, whoever has them yet.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         self.robot.close();
         if let Some(camera) = &self.camera {
             camera.close();

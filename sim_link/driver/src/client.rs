@@ -116,7 +116,7 @@ impl Driver {
     }
 
     /// Its command or address.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.owner.shared.driver
     }
 
@@ -136,7 +136,7 @@ impl Driver {
     }
 
     /// The clock that its stamps are related to.
-    pub fn timebase(&self) -> Timebase {
+    pub(crate) fn timebase(&self) -> Timebase {
         self.owner.shared.options.timebase
     }
 
@@ -188,7 +188,7 @@ impl Driver {
     ///
     /// # Errors
     /// [`DriverError::Gone`]; why there is no pose is the inner error.
-    pub fn robot_at(&self, stamp_s: f64, patience: Duration) -> Result<Result<RobotAt, NoPose>, DriverError> {
+    pub(crate) fn robot_at(&self, stamp_s: f64, patience: Duration) -> Result<Result<RobotAt, NoPose>, DriverError> {
         if !self.hello().can(Ability::State) {
             return Ok(Err(NoPose::NoRobot));
         }
@@ -275,7 +275,7 @@ impl Driver {
     }
 
     /// Ends it, whoever has it yet, and waits until it has ended.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         let shared = &self.owner.shared;
         shared.finish(Ending::ClosedHere);
         // It is killed after the farewell; the second is for the system.

@@ -22,7 +22,7 @@ pub struct Timebase(Instant);
 
 impl Timebase {
     /// A clock that starts now.
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(Instant::now())
     }
 
@@ -68,7 +68,7 @@ pub struct ClockOffset {
 impl ClockOffset {
     /// A pong: when its ping left and when it arrived on our clock, and the driver's stamp, all in seconds. One that
     /// contradicts those before says that a clock was set: they are forgotten.
-    pub fn add(&mut self, left_s: f64, arrived_s: f64, stamp_s: f64) {
+    pub(crate) fn add(&mut self, left_s: f64, arrived_s: f64, stamp_s: f64) {
         let pong = Pong { arrived: arrived_s, least: left_s - stamp_s, greatest: arrived_s - stamp_s };
         if let Some((low_s, high_s)) = self.interval(arrived_s)
             && (pong.least > high_s || pong.greatest < low_s)
@@ -84,7 +84,7 @@ impl ClockOffset {
     }
 
     /// The offset at a time of our clock; `None` before the first pong.
-    pub fn at(&self, now_s: f64) -> Option<Offset> {
+    pub(crate) fn at(&self, now_s: f64) -> Option<Offset> {
         let (low_s, high_s) = self.interval(now_s)?;
         let uncertainty_s = 0.5 * (high_s - low_s).max(0.0);
         Some(Offset { offset_s: 0.5 * (low_s + high_s), uncertainty_s, jumps: self.jumps })

@@ -8,17 +8,17 @@ use handeye_capture::NO_IMAGES_S;
 /// The states before and after an image are no farther apart than this \[s\]: they say too little of what was between them.
 pub const STATES_APART_S: f64 = 0.25;
 /// An image waits for the state after it for so long: three of the slowest driver.
-pub const STATE_AFTER_IMAGE: Duration = Duration::from_millis(300);
+pub(crate) const STATE_AFTER_IMAGE: Duration = Duration::from_millis(300);
 /// An image is no older than this when it is here \[s\]: what is seen is to be what is done.
-pub const IMAGE_AGE_S: f64 = 1.0;
+pub(crate) const IMAGE_AGE_S: f64 = 1.0;
 /// The first state and the first image come within this time after `hello`, which is answered before anything slow is loaded.
 pub const FIRST: Duration = Duration::from_secs(10);
 /// The next image comes within this time: as long as a capture waits for one.
-pub const IMAGE_WAIT: Duration = Duration::from_secs(NO_IMAGES_S as u64);
+pub(crate) const IMAGE_WAIT: Duration = Duration::from_secs(NO_IMAGES_S as u64);
 /// After `done` each joint is this close to its goal \[rad\], and so is the orientation of a tip that was sent to a pose.
-pub const GOAL_RAD: f64 = 2e-3;
+pub(crate) const GOAL_RAD: f64 = 2e-3;
 /// The same of a prismatic joint and of the place of a tip \[m\].
-pub const GOAL_M: f64 = 2e-3;
+pub(crate) const GOAL_M: f64 = 2e-3;
 
 #[cfg(test)]
 mod tests {

@@ -38,7 +38,7 @@ pub struct Preparing(Arc<Mutex<Option<String>>>);
 
 impl Preparing {
     /// The newest, for people.
-    pub fn text(&self) -> Option<String> {
+    pub(crate) fn text(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 

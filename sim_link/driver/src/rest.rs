@@ -63,7 +63,7 @@ impl RestWatch {
     }
 
     /// The arm is known to move: it has not stood before this.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.since = None;
     }
 

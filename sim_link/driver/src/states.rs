@@ -90,7 +90,7 @@ impl Reading {
     /// # Errors
     /// [`BadMessage`] for a pose that is none, a number of joints other than `joints`, places where no arm is, and where nothing
     /// says where the tip is.
-    pub fn of(state: &StateMessage, joints: usize, arm: Option<&Arm>) -> Result<Self, BadMessage> {
+    pub(crate) fn of(state: &StateMessage, joints: usize, arm: Option<&Arm>) -> Result<Self, BadMessage> {
         if let Some(values) = &state.joints_rad
             && values.len() != joints
         {
@@ -131,7 +131,7 @@ impl Reading {
     }
 
     /// Where the arm is, for a [`RestWatch`](super::RestWatch).
-    pub fn place(&self) -> Place {
+    pub(crate) fn place(&self) -> Place {
         Place { stamp_s: self.stamp_s, joints: self.joints, base_from_tip: self.base_from_tip }
     }
 

@@ -8,7 +8,7 @@ use super::message::{BadMessage, FromDriver};
 /// Longest line in bytes, its end included.
 pub const MAX_LINE: usize = 65_536;
 /// Most bytes that follow a line: an image of 22 million pixels in colour.
-pub const MAX_BYTES: u64 = 67_108_864;
+pub(crate) const MAX_BYTES: u64 = 67_108_864;
 /// Bytes are taken in pieces of this size, so that what is promised and does not come takes no memory.
 const PIECE: u64 = 1 << 20;
 /// How much of a line is shown.
@@ -91,7 +91,7 @@ pub struct Excerpt(String);
 
 impl Excerpt {
     /// Of the bytes of a line. What is no text becomes �.
-    pub fn of(line: &[u8]) -> Self {
+    pub(crate) fn of(line: &[u8]) -> Self {
         let mut shown = String::new();
         for chunk in line.trim_ascii().utf8_chunks() {
             for character in chunk.valid().chars() {
@@ -118,7 +118,7 @@ handeye_wording::plain_values!(Excerpt);
 
 /// Reads the messages of a driver. After an error there is no way to tell where the next message begins.
 #[derive(Debug)]
-pub struct MessageReader<R> {
+pub(crate) struct MessageReader<R> {
     source: R,
     number: u64,
     line: Vec<u8>,

@@ -62,7 +62,7 @@ pub enum Moves {
 
 impl CellFacts {
     /// By what the cell says of itself.
-    pub fn new(info: &CellInfo, arm: Option<&ArmKinematics>, truth: Option<&GroundTruth>) -> Self {
+    pub(crate) fn new(info: &CellInfo, arm: Option<&ArmKinematics>, truth: Option<&GroundTruth>) -> Self {
         Self {
             joints: info.joints.iter().map(JointFacts::from).collect(),
             nominal_intrinsics: Some(info.camera_intrinsics_nominal()),

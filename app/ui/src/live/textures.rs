@@ -66,7 +66,7 @@ impl LiveTextures {
 
     /// How many frames were uploaded.
     #[cfg(test)]
-    pub fn uploads(&self) -> u64 {
+    pub(crate) fn uploads(&self) -> u64 {
         self.uploads
     }
 }
@@ -147,7 +147,7 @@ impl Thumbnails {
 
     /// How many thumbnails were uploaded.
     #[cfg(test)]
-    pub fn uploads(&self) -> u64 {
+    pub(crate) fn uploads(&self) -> u64 {
         self.uploads
     }
 }

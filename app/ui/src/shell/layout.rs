@@ -31,7 +31,7 @@ pub struct Slot(String);
 
 impl Slot {
     /// The pane; `None` when this version has none of that name.
-    pub fn pane(&self) -> Option<Pane> {
+    pub(crate) fn pane(&self) -> Option<Pane> {
         Pane::ALL.into_iter().find(|&pane| Self::from(pane) == *self)
     }
 }
@@ -147,7 +147,7 @@ impl Layout {
     }
 
     /// Leaves out what the cell does not have, and brings it back where another one has it.
-    pub fn leave_out(&mut self, model: &Model) {
+    pub(crate) fn leave_out(&mut self, model: &Model) {
         let has_depth = model.cell.as_ref().is_none_or(|cell| cell.has_depth) || model.review.is_some();
         for (pane, is_there) in [(Pane::Depth, has_depth), (Pane::Taught, model.moves() != Moves::Never)] {
             if let Some(tile) = self.tree.tiles.find_pane(&Slot::from(pane))
@@ -159,33 +159,33 @@ impl Layout {
     }
 
     /// Brings a pane to the front.
-    pub fn show(&mut self, pane: Pane) {
+    pub(crate) fn show(&mut self, pane: Pane) {
         let slot = Slot::from(pane);
         self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == slot));
     }
 
     /// Brings the panes of a step to the front.
-    pub fn go_to(&mut self, step: Step) {
+    pub(crate) fn go_to(&mut self, step: Step) {
         for &pane in panes_of(step) {
             self.show(pane);
         }
     }
 
     /// Brings the most important pane of a step to the front, and no other.
-    pub fn arrive_at(&mut self, step: Step) {
+    pub(crate) fn arrive_at(&mut self, step: Step) {
         if let Some(&pane) = panes_of(step).last() {
             self.show(pane);
         }
     }
 
     /// The panes that are drawn, and not behind another tab.
-    pub fn in_front(&self) -> Vec<Pane> {
+    pub(crate) fn in_front(&self) -> Vec<Pane> {
         let slots = self.tree.active_tiles().into_iter().filter_map(|id| self.tree.tiles.get_pane(&id));
         slots.filter_map(Slot::pane).collect()
     }
 
     /// The tab containers, which are drawn as cards.
-    pub fn cards(&self) -> impl Iterator<Item = TileId> + '_ {
+    pub(crate) fn cards(&self) -> impl Iterator<Item = TileId> + '_ {
         self.tree
             .tiles
             .iter()
@@ -193,7 +193,7 @@ impl Layout {
     }
 
     /// Whether a pane is drawn, and not behind another tab.
-    pub fn is_in_front(&self, pane: Pane) -> bool {
+    pub(crate) fn is_in_front(&self, pane: Pane) -> bool {
         self.in_front().contains(&pane)
     }
 }

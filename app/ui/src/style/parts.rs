@@ -15,7 +15,7 @@ const CAPTIONS: f32 = 128.0;
 const SIGN_BUTTON: f32 = 24.0;
 
 /// The body of a pane: scrolls when its tile is small.
-pub fn body_ui(ui: &mut Ui, salt: &str, content_ui: impl FnOnce(&mut Ui)) {
+pub(crate) fn body_ui(ui: &mut Ui, salt: &str, content_ui: impl FnOnce(&mut Ui)) {
     ScrollArea::vertical().id_salt(salt).auto_shrink(false).show(ui, |ui| {
         Frame::new().inner_margin(Margin::symmetric(12, 10)).show(ui, |ui| {
             ui.set_width(ui.available_width());
@@ -26,12 +26,12 @@ pub fn body_ui(ui: &mut Ui, salt: &str, content_ui: impl FnOnce(&mut Ui)) {
 }
 
 /// A heading within a pane.
-pub fn section_ui(ui: &mut Ui, title: &str) {
+pub(crate) fn section_ui(ui: &mut Ui, title: &str) {
     section_with_ui(ui, title, |_| ());
 }
 
 /// A heading, and what stands beside it.
-pub fn section_with_ui(ui: &mut Ui, title: &str, beside_ui: impl FnOnce(&mut Ui)) {
+pub(crate) fn section_with_ui(ui: &mut Ui, title: &str, beside_ui: impl FnOnce(&mut Ui)) {
     ui.add_space(6.0);
     ui.horizontal(|ui| {
         ui.label(RichText::new(title).strong().size(13.5).color(Palette::of(ui).text));
@@ -40,13 +40,13 @@ pub fn section_with_ui(ui: &mut Ui, title: &str, beside_ui: impl FnOnce(&mut Ui)
 }
 
 /// A sentence that explains.
-pub fn hint_ui(ui: &mut Ui, text: &str) {
+pub(crate) fn hint_ui(ui: &mut Ui, text: &str) {
     let weak = Palette::of(ui).weak;
     ui.add(Label::new(RichText::new(text).color(weak)).wrap());
 }
 
 /// What a pane shows when it has nothing to show, and what to do about it.
-pub fn empty_ui(ui: &mut Ui, title: &str, detail: &str) {
+pub(crate) fn empty_ui(ui: &mut Ui, title: &str, detail: &str) {
     let palette = Palette::of(ui);
     ui.add_space(14.0);
     ui.vertical_centered(|ui| {
@@ -58,7 +58,7 @@ pub fn empty_ui(ui: &mut Ui, title: &str, detail: &str) {
 }
 
 /// A sentence with a tone, and what belongs to it, on a tinted strip.
-pub fn notice_ui<R>(ui: &mut Ui, tone: Tone, text: &str, below_ui: impl FnOnce(&mut Ui) -> R) -> R {
+pub(crate) fn notice_ui<R>(ui: &mut Ui, tone: Tone, text: &str, below_ui: impl FnOnce(&mut Ui) -> R) -> R {
     let palette = Palette::of(ui);
     Frame::new()
         .fill(palette.tinted(tone))
@@ -74,13 +74,13 @@ pub fn notice_ui<R>(ui: &mut Ui, tone: Tone, text: &str, below_ui: impl FnOnce(&
 }
 
 /// A caption and its value, read together by a screen reader.
-pub fn stated_ui(ui: &mut Ui, caption: &str, value: &str) -> Response {
+pub(crate) fn stated_ui(ui: &mut Ui, caption: &str, value: &str) -> Response {
     let colour = Palette::of(ui).text;
     stated_in_ui(ui, caption, value, colour)
 }
 
 /// The same in a colour.
-pub fn stated_in_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
+pub(crate) fn stated_in_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
     ui.scope(|ui| {
         // Numbers stand closer than controls do.
         ui.spacing_mut().interact_size.y = 18.0;
@@ -90,7 +90,7 @@ pub fn stated_in_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color
 }
 
 /// Width of a caption with this value in one line.
-pub fn stated_width(ui: &Ui, value: &str) -> f32 {
+pub(crate) fn stated_width(ui: &Ui, value: &str) -> f32 {
     let font = egui::TextStyle::Monospace.resolve(ui.style());
     let value = ui.painter().layout_no_wrap(value.to_owned(), font, egui::Color32::WHITE).size().x;
     // A point for rounding.
@@ -98,7 +98,7 @@ pub fn stated_width(ui: &Ui, value: &str) -> f32 {
 }
 
 /// A value in figures of one width, with the caption that a screen reader says before it.
-pub fn value_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
+pub(crate) fn value_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) -> Response {
     let label = ui.add(Label::new(RichText::new(value).monospace().color(colour)).wrap().sense(Sense::hover()));
     label.widget_info(|| {
         let spoken = value.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -108,7 +108,7 @@ pub fn value_ui(ui: &mut Ui, caption: &str, value: &str, colour: egui::Color32) 
 }
 
 /// A caption at the left and what belongs to it at the right.
-pub fn row_ui<R>(ui: &mut Ui, caption: &str, content_ui: impl FnOnce(&mut Ui) -> R) -> R {
+pub(crate) fn row_ui<R>(ui: &mut Ui, caption: &str, content_ui: impl FnOnce(&mut Ui) -> R) -> R {
     ui.horizontal(|ui| {
         let weak = Palette::of(ui).weak;
         ui.allocate_ui_with_layout(Vec2::new(CAPTIONS, 18.0), Layout::left_to_right(Align::Center), |ui| {
@@ -121,24 +121,24 @@ pub fn row_ui<R>(ui: &mut Ui, caption: &str, content_ui: impl FnOnce(&mut Ui) ->
 }
 
 /// A caption in small letters.
-pub fn caption_ui(ui: &mut Ui, text: &str) -> Response {
+pub(crate) fn caption_ui(ui: &mut Ui, text: &str) -> Response {
     let weak = Palette::of(ui).weak;
     ui.add(Label::new(RichText::new(text).size(CAPTION).color(weak)).wrap())
 }
 
 /// A dot in the colour of a tone.
-pub fn dot_ui(ui: &mut Ui, colour: egui::Color32) {
+pub(crate) fn dot_ui(ui: &mut Ui, colour: egui::Color32) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(10.0, 18.0), Sense::hover());
     ui.painter().circle_filled(rect.center(), 4.0, colour);
 }
 
 /// A button that does nothing while there is a reason, which it then says.
-pub fn gated_ui(ui: &mut Ui, reason: Option<&str>, button: Button<'_>) -> Response {
+pub(crate) fn gated_ui(ui: &mut Ui, reason: Option<&str>, button: Button<'_>) -> Response {
     ui.add_enabled(reason.is_none(), button).on_disabled_hover_text(reason.unwrap_or_default())
 }
 
 /// A bar of progress, 0 to 1, with what it says aloud and a button that ends it; tells whether that was clicked.
-pub fn progress_ui(ui: &mut Ui, part: f32, reported: &str, end: &str) -> bool {
+pub(crate) fn progress_ui(ui: &mut Ui, part: f32, reported: &str, end: &str) -> bool {
     ui.label(RichText::new(reported).color(Palette::of(ui).text));
     ui.horizontal(|ui| {
         // From the right, so that the bar gets what the button leaves.
@@ -154,7 +154,7 @@ pub fn progress_ui(ui: &mut Ui, part: f32, reported: &str, end: &str) -> bool {
 }
 
 /// A button that puts a text on the clipboard; `what` tells it from others.
-pub fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl FnOnce() -> String) {
+pub(crate) fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl FnOnce() -> String) {
     let response = ui.add(small_button(ui, tr!(language, "Copy")));
     let reported = handeye_wording::text!("Copy {what}", what = what).in_language(language);
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &reported));
@@ -165,7 +165,7 @@ pub fn copy_ui(ui: &mut Ui, language: Language, what: &str, text: impl FnOnce() 
 
 /// Signs of small buttons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sign {
+pub(crate) enum Sign {
     /// Towards the top.
     Up,
     /// Towards the bottom.
@@ -177,12 +177,12 @@ pub enum Sign {
 }
 
 /// A button that stands in a line of text, and is as large as others where it is pressed with a finger.
-pub fn small_button<'a>(ui: &Ui, words: impl Into<egui::WidgetText>) -> Button<'a> {
+pub(crate) fn small_button<'a>(ui: &Ui, words: impl Into<egui::WidgetText>) -> Button<'a> {
     Button::new(words.into()).small().min_size(theme::least(ui, 0.0, 0.0))
 }
 
 /// A button with a sign, which has a name for those who cannot see it.
-pub fn sign_ui(ui: &mut Ui, sign: Sign, name: &str, enabled: bool) -> Response {
+pub(crate) fn sign_ui(ui: &mut Ui, sign: Sign, name: &str, enabled: bool) -> Response {
     let sense = if sign == Sign::Grip { Sense::drag() } else { Sense::click() };
     let button = Button::new("")
         .frame_when_inactive(false)
@@ -225,6 +225,6 @@ pub fn remembered<T: 'static + Clone + Default + Send + Sync>(ui: &Ui, id: Id) -
 }
 
 /// Remembers it.
-pub fn remember<T: 'static + Clone + Send + Sync>(ui: &Ui, id: Id, value: T) {
+pub(crate) fn remember<T: 'static + Clone + Send + Sync>(ui: &Ui, id: Id, value: T) {
     ui.data_mut(|data| data.insert_temp(id, value));
 }

@@ -6,20 +6,20 @@ use super::fonts;
 use handeye_workbench::model::{Severity, ThemeChoice};
 
 /// Text of captions above numbers.
-pub const CAPTION: f32 = 11.0;
+pub(crate) const CAPTION: f32 = 11.0;
 /// Titles of empty states.
-pub const TITLE: f32 = 19.0;
+pub(crate) const TITLE: f32 = 19.0;
 /// Rounding of cards and banners.
-pub const CARD_RADIUS: u8 = 8;
+pub(crate) const CARD_RADIUS: u8 = 8;
 /// Distance between cards, and from cards to the edge.
-pub const GAP: f32 = 8.0;
+pub(crate) const GAP: f32 = 8.0;
 
 /// Height of what is pressed with a pointer \[points\].
 const POINTER: f32 = 26.0;
 /// Between the edge of a button and its words \[points\].
 const PADDING: Vec2 = Vec2::new(10.0, 4.0);
 /// Least width and height of what is pressed with a finger \[points\].
-pub const FINGER: f32 = 40.0;
+pub(crate) const FINGER: f32 = 40.0;
 
 /// Colours with a meaning.
 #[derive(Debug, Clone, Copy)]
@@ -131,12 +131,12 @@ pub enum Tone {
 
 impl Palette {
     /// The colours of the theme that `ui` is drawn in.
-    pub fn of(ui: &egui::Ui) -> &'static Self {
+    pub(crate) fn of(ui: &egui::Ui) -> &'static Self {
         if ui.visuals().dark_mode { &DARK } else { &LIGHT }
     }
 
     /// The colour of a tone.
-    pub fn tone(&self, tone: Tone) -> Color32 {
+    pub(crate) fn tone(&self, tone: Tone) -> Color32 {
         match tone {
             Tone::Good => self.good,
             Tone::Busy => self.busy,
@@ -146,7 +146,7 @@ impl Palette {
     }
 
     /// The colour of a message.
-    pub fn severity(&self, severity: Severity) -> Color32 {
+    pub(crate) fn severity(&self, severity: Severity) -> Color32 {
         match severity {
             Severity::Info => self.weak,
             Severity::Warning => self.warning,
@@ -155,18 +155,18 @@ impl Palette {
     }
 
     /// A surface that is one step above the cards: fields, hovered rows.
-    pub fn raised(&self) -> Color32 {
+    pub(crate) fn raised(&self) -> Color32 {
         self.card.lerp_to_gamma(self.text, 0.05)
     }
 
     /// A surface that hints at a tone.
-    pub fn tinted(&self, tone: Tone) -> Color32 {
+    pub(crate) fn tinted(&self, tone: Tone) -> Color32 {
         self.card.lerp_to_gamma(self.tone(tone), 0.16)
     }
 }
 
 /// The tint of an image that is out of date.
-pub fn stale_tint() -> Color32 {
+pub(crate) fn stale_tint() -> Color32 {
     Color32::from_gray(110)
 }
 
@@ -205,7 +205,7 @@ pub fn choose(ctx: &egui::Context, theme: ThemeChoice) {
 }
 
 /// Whether what is pressed is made for fingers now.
-pub fn is_for_fingers(ui: &egui::Ui) -> bool {
+pub(crate) fn is_for_fingers(ui: &egui::Ui) -> bool {
     ui.ctx().global_style().spacing.interact_size.y >= FINGER
 }
 

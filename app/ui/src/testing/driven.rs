@@ -9,20 +9,20 @@ use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::Model;
 
 /// What a pane is.
-pub type PaneUi = fn(&mut Ui, &Model, &mut Outbox);
+pub(crate) type PaneUi = fn(&mut Ui, &Model, &mut Outbox);
 
 /// Nothing has to be scrolled to.
 const HEIGHT: f32 = 2400.0;
 
 /// The pane with its model and what it asks for.
-pub struct Driven {
+pub(crate) struct Driven {
     /// Draws it.
     pub harness: Harness<'static, (Model, Outbox)>,
 }
 
 impl Driven {
     /// As wide as a tile, and so high that nothing has to be scrolled to.
-    pub fn new(pane: PaneUi, model: Model) -> Self {
+    pub(crate) fn new(pane: PaneUi, model: Model) -> Self {
         let harness = Harness::builder().with_size(vec2(420.0, HEIGHT)).build_ui_state(
             move |ui, (model, outbox): &mut (Model, Outbox)| {
                 // Fonts are there from the frame after the one that they are installed in.
@@ -42,38 +42,38 @@ impl Driven {
     }
 
     /// The same in another width.
-    pub fn widen(&mut self, width: f32) {
+    pub(crate) fn widen(&mut self, width: f32) {
         self.harness.set_size(vec2(width, HEIGHT));
         self.steps();
     }
 
     /// Draws until what was done shows.
-    pub fn steps(&mut self) {
+    pub(crate) fn steps(&mut self) {
         self.harness.run_steps(3);
     }
 
     /// The model, to change it.
-    pub fn model(&mut self) -> &mut Model {
+    pub(crate) fn model(&mut self) -> &mut Model {
         &mut self.harness.state_mut().0
     }
 
     /// What was asked for since the last time.
-    pub fn commands(&mut self) -> Vec<Command> {
+    pub(crate) fn commands(&mut self) -> Vec<Command> {
         self.harness.state_mut().1.drain().map(|(command, _)| command).collect()
     }
 
     /// Whether a text is on the screen.
-    pub fn sees(&self, part: &str) -> bool {
+    pub(crate) fn sees(&self, part: &str) -> bool {
         self.harness.query_all_by_label_contains(part).count() > 0
     }
 
     /// Whether a control can be used.
-    pub fn is_enabled(&self, label: &str) -> bool {
+    pub(crate) fn is_enabled(&self, label: &str) -> bool {
         !self.harness.get_by_label(label).accesskit_node().is_disabled()
     }
 
     /// Clicks a control and gives what it asks for.
-    pub fn click(&mut self, label: &str) -> Vec<Command> {
+    pub(crate) fn click(&mut self, label: &str) -> Vec<Command> {
         self.commands();
         self.harness.get_by_label(label).click();
         self.steps();
@@ -81,7 +81,7 @@ impl Driven {
     }
 
     /// Puts a text into a field in place of what is in it.
-    pub fn retype(&mut self, label: &str, text: &str) {
+    pub(crate) fn retype(&mut self, label: &str, text: &str) {
         self.harness.get_by_label(label).click();
         self.steps();
         self.harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
@@ -91,7 +91,7 @@ impl Driven {
     }
 
     /// Puts a text into a field that is empty or selects all when it is entered.
-    pub fn type_into(&mut self, label: &str, text: &str) {
+    pub(crate) fn type_into(&mut self, label: &str, text: &str) {
         self.harness.get_by_label(label).click();
         self.steps();
         self.harness.get_by_label(label).type_text(text);
@@ -99,7 +99,7 @@ impl Driven {
     }
 
     /// Presses and releases a key, and gives what it asks for.
-    pub fn press(&mut self, key: egui::Key) -> Vec<Command> {
+    pub(crate) fn press(&mut self, key: egui::Key) -> Vec<Command> {
         self.commands();
         self.harness.key_press(key);
         self.steps();
@@ -107,7 +107,7 @@ impl Driven {
     }
 
     /// Whether everything is inside the width of the pane.
-    pub fn nothing_is_cut_off(&self) -> bool {
+    pub(crate) fn nothing_is_cut_off(&self) -> bool {
         let width = self.harness.ctx.content_rect().width();
         let placed = self.harness.query_all_by(|node| node.raw_bounds().is_some());
         placed.into_iter().all(|node| node.rect().max.x <= width + 0.5)

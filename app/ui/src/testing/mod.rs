@@ -39,17 +39,17 @@ pub const SIZE: Vec2 = vec2(1440.0, 900.0);
 
 impl Silent {
     /// With a cell that is not there yet.
-    pub fn new(source: CellSource) -> Self {
+    pub(crate) fn new(source: CellSource) -> Self {
         Self::of_size(source, SIZE)
     }
 
     /// The same in another size.
-    pub fn of_size(source: CellSource, size: Vec2) -> Self {
+    pub(crate) fn of_size(source: CellSource, size: Vec2) -> Self {
         Self::built(source, Harness::builder().with_size(size))
     }
 
     /// The same in a harness that is set up otherwise, as to make images.
-    pub fn built(source: CellSource, builder: HarnessBuilder<Window>) -> Self {
+    pub(crate) fn built(source: CellSource, builder: HarnessBuilder<Window>) -> Self {
         let (cell, release) = FakeCell::that_never_answers();
         // The workers fail once and then wait for the user, so that nothing comes from them.
         cell.script().refusals = vec![PortError::Hopeless(Text::verbatim("not in this test")); 2];
@@ -94,12 +94,12 @@ impl Silent {
     }
 
     /// Draws until what was done shows.
-    pub fn steps(&mut self) {
+    pub(crate) fn steps(&mut self) {
         self.harness.run_steps(3);
     }
 
     /// Waits until what the archive and the other threads do shows in the model.
-    pub fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
+    pub(crate) fn until(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
         let deadline = Instant::now() + Duration::from_secs(30);
         loop {
             self.steps();
@@ -114,53 +114,53 @@ impl Silent {
     }
 
     /// The application.
-    pub fn app(&mut self) -> &mut App {
+    pub(crate) fn app(&mut self) -> &mut App {
         self.harness.state_mut().app()
     }
 
     /// Shows something else.
-    pub fn show_model(&mut self, model: Model) {
+    pub(crate) fn show_model(&mut self, model: Model) {
         self.app().replace_model(model);
         self.steps();
     }
 
     /// Lets something happen.
-    pub fn absorb(&mut self, event: impl Into<Event>) {
+    pub(crate) fn absorb(&mut self, event: impl Into<Event>) {
         self.app().absorb(event);
         self.steps();
     }
 
     /// Both connections are in a state.
-    pub fn links(&mut self, state: &LinkState) {
+    pub(crate) fn links(&mut self, state: &LinkState) {
         for link in [Link::Control, Link::Camera] {
             self.absorb(connect::Event::Link { link, state: state.clone() });
         }
     }
 
     /// Whether a text is on the screen.
-    pub fn sees(&self, part: &str) -> bool {
+    pub(crate) fn sees(&self, part: &str) -> bool {
         self.harness.query_all_by_label_contains(part).count() > 0
     }
 
     /// Does what a pane would ask for.
-    pub fn command(&mut self, command: impl Into<Command>) {
+    pub(crate) fn command(&mut self, command: impl Into<Command>) {
         self.harness.state_mut().apply(command);
         self.steps();
     }
 
     /// Brings a pane to the front.
-    pub fn show(&mut self, pane: Pane) {
+    pub(crate) fn show(&mut self, pane: Pane) {
         self.command(shell::Command::ShowPane(pane));
     }
 
     /// Presses keys.
-    pub fn press(&mut self, modifiers: egui::Modifiers, key: egui::Key) {
+    pub(crate) fn press(&mut self, modifiers: egui::Modifiers, key: egui::Key) {
         self.harness.key_press_modifiers(modifiers, key);
         self.steps();
     }
 
     /// Clicks what has a label.
-    pub fn click(&mut self, label: &str) {
+    pub(crate) fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).scroll_to_me();
         self.steps();
         self.harness.get_by_label(label).click();
@@ -168,7 +168,7 @@ impl Silent {
     }
 
     /// Connected, with a robot and an image.
-    pub fn live() -> Self {
+    pub(crate) fn live() -> Self {
         let mut silent = Self::new(CellSource::default());
         silent.links(&connected());
         silent.absorb(connect::Event::Robot(robot(Simulation::Running)));

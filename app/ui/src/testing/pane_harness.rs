@@ -10,7 +10,7 @@ use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::{ImagePoint, Model};
 
 /// What a pane is drawn from, and what comes out of it.
-pub struct PaneState {
+pub(crate) struct PaneState {
     /// What it shows.
     pub model: Model,
     /// What the user wants.
@@ -25,14 +25,14 @@ pub struct PaneState {
 const STEP_S: f32 = 1.0 / 60.0;
 
 /// A pane under test.
-pub struct PaneHarness {
+pub(crate) struct PaneHarness {
     /// For what the functions below do not do.
     pub harness: Harness<'static, PaneState>,
 }
 
 impl PaneHarness {
     /// A pane of a size.
-    pub fn new(model: Model, size: Vec2, pane_ui: fn(&mut Ui, &mut PaneState)) -> Self {
+    pub(crate) fn new(model: Model, size: Vec2, pane_ui: fn(&mut Ui, &mut PaneState)) -> Self {
         let state = PaneState { model, outbox: Outbox::default(), textures: Textures::default(), pointed: None };
         let harness = Harness::builder().with_size(size).with_step_dt(STEP_S).build_ui_state(
             move |ui, state: &mut PaneState| {
@@ -49,27 +49,27 @@ impl PaneHarness {
     }
 
     /// Draws it a few times.
-    pub fn steps(&mut self) {
+    pub(crate) fn steps(&mut self) {
         self.harness.run_steps(3);
     }
 
     /// What the user wanted since this was last asked.
-    pub fn commands(&mut self) -> Vec<Command> {
+    pub(crate) fn commands(&mut self) -> Vec<Command> {
         self.harness.state_mut().outbox.drain().map(|(command, _)| command).collect()
     }
 
     /// The model, to change it.
-    pub fn model(&mut self) -> &mut Model {
+    pub(crate) fn model(&mut self) -> &mut Model {
         &mut self.harness.state_mut().model
     }
 
     /// Whether words are on the screen.
-    pub fn sees(&self, words: &str) -> bool {
+    pub(crate) fn sees(&self, words: &str) -> bool {
         self.harness.query_all_by_label_contains(words).count() > 0
     }
 
     /// Clicks on what has this label; gives what comes of it.
-    pub fn click(&mut self, label: &str) -> Vec<Command> {
+    pub(crate) fn click(&mut self, label: &str) -> Vec<Command> {
         self.commands();
         self.harness.get_by_label(label).click();
         self.steps();
@@ -77,7 +77,7 @@ impl PaneHarness {
     }
 
     /// Where something is.
-    pub fn rect(&self, label: &str) -> egui::Rect {
+    pub(crate) fn rect(&self, label: &str) -> egui::Rect {
         self.harness.get_by_label(label).rect()
     }
 }

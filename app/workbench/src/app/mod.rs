@@ -16,7 +16,7 @@ use std::time::Instant;
 use handeye_coppeliasim::cell::CellPaths;
 
 use crate::by_hand::update::guided_by_hand_step;
-use crate::command::{Command, Event, Outbox};
+use crate::command::{Command, Event};
 use crate::guided::update::guided_step;
 use crate::keep_out::update::{keep_keep_out, send_keep_out};
 use crate::model::{CellSource, Drivers, Model, Severity, ViewSettings};
@@ -181,14 +181,6 @@ impl App {
     /// What stops the arm, for other threads.
     pub fn stop_line(&self) -> &Arc<StopLine> {
         self.cx.workers.stop_line()
-    }
-
-    /// Applies the commands of a frame of the window.
-    pub fn apply_all(&mut self, outbox: &mut Outbox) {
-        for (command, place) in outbox.drain() {
-            tracing::trace!(?command, %place, "command");
-            self.apply(command);
-        }
     }
 
     /// Does what the user wants, or has a worker do it. Never waits for a worker.

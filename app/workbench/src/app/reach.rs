@@ -43,7 +43,7 @@ impl Reach {
     }
 
     /// What files in a folder may name: an upload what is in the upload, another one what is in the folder that browsers reach.
-    pub fn bounds_of(&self, path: &Path) -> Bounds {
+    pub(crate) fn bounds_of(&self, path: &Path) -> Bounds {
         let upload = self.uploads.as_ref().and_then(|uploads| {
             let own = path.strip_prefix(uploads).ok()?.components().next()?;
             Some(Bounds::within(&uploads.join(own))).filter(|upload| upload.has(path))
@@ -55,7 +55,7 @@ impl Reach {
     }
 
     /// Why a command is not carried out; `None` if it may be.
-    pub fn refusal(&self, command: &Command) -> Option<Text> {
+    pub(crate) fn refusal(&self, command: &Command) -> Option<Text> {
         match command {
             Command::Session(
                 session::Command::Open(path)

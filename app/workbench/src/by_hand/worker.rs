@@ -16,7 +16,7 @@ use crate::model::Solved;
 use crate::worker::link::Outlet;
 
 /// A choice that is asked for.
-pub struct HandJob {
+pub(crate) struct HandJob {
     /// Its number.
     pub number: u64,
     /// What chooses.

@@ -12,7 +12,7 @@ pub fn board(blur_px: i32) -> RgbImage {
 }
 
 /// The same, brighter by some grey levels.
-pub fn brighter_board(blur_px: i32, brighter: f64) -> RgbImage {
+pub(crate) fn brighter_board(blur_px: i32, brighter: f64) -> RgbImage {
     let level = |u: i32, v: i32| {
         let (x, y) = ((u - 100).div_euclid(24), (v - 100).div_euclid(24));
         let on_board = (-1..10).contains(&x) && (-1..7).contains(&y);

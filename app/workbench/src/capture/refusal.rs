@@ -14,7 +14,7 @@ use handeye_wording::text;
 pub type Why = (RefusalKind, Text);
 
 /// Why no images came together.
-pub fn of_machine(refusal: &Refusal) -> Why {
+pub(crate) fn of_machine(refusal: &Refusal) -> Why {
     match refusal {
         Refusal::RobotMoves { after_s, rate } => {
             let seconds = format!("{after_s:.0}");
@@ -92,7 +92,7 @@ pub fn no_pose(why: Option<&Text>) -> Why {
 }
 
 /// The image could not be searched at all.
-pub fn not_searched(error: &VisionError) -> Why {
+pub(crate) fn not_searched(error: &VisionError) -> Why {
     (RefusalKind::NoBoard, text!("The board cannot be looked for: {why}", why = error))
 }
 
@@ -118,11 +118,11 @@ pub fn cancelled() -> Why {
 }
 
 /// A newer one takes its place.
-pub fn another_capture() -> Why {
+pub(crate) fn another_capture() -> Why {
     (RefusalKind::Cancelled, text!("The capture was replaced by a newer one"))
 }
 
 /// It would have been measured on another board.
-pub fn other_target() -> Why {
+pub(crate) fn other_target() -> Why {
     (RefusalKind::Cancelled, text!("The target was changed: capture again"))
 }

@@ -31,7 +31,7 @@ pub struct Sequence {
 
 impl Sequence {
     /// A request at a time on the clock that images arrive by, for the board that is looked for.
-    pub fn new(request: CaptureRequest, target: TargetSpec, now_s: f64) -> Self {
+    pub(crate) fn new(request: CaptureRequest, target: TargetSpec, now_s: f64) -> Self {
         let CaptureOptions { frames, least_distance_m, least_angle_rad, settle_limit_s } = request.options;
         let others = request.others.clone();
         let plan = Plan { frames, settle_limit_s, least_distance_m, least_angle_rad, others };
@@ -39,12 +39,12 @@ impl Sequence {
     }
 
     /// The number of the request.
-    pub fn number(&self) -> u64 {
+    pub(crate) fn number(&self) -> u64 {
         self.request.number
     }
 
     /// Takes in an image; whether it was the last that is needed.
-    pub fn see(&mut self, frame: &LiveFrame, grey: &GrayImage) -> bool {
+    pub(crate) fn see(&mut self, frame: &LiveFrame, grey: &GrayImage) -> bool {
         let LiveFrame { info, images } = frame;
         self.lacks_pose = info.base_from_tip.is_none().then(|| refusal::no_pose(info.no_pose.as_deref()));
         let Some(base_from_tip) = info.base_from_tip else { return self.is_complete() };
@@ -67,29 +67,29 @@ impl Sequence {
     }
 
     /// Whether all images are there.
-    pub fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.machine.progress() == Progress::Complete
     }
 
     /// Whether [`Self::saw_board`] of the last image matters: where corners are to be compared from image to image, and
     /// the image belongs to the average.
-    pub fn compares_corners(&self) -> bool {
+    pub(crate) fn compares_corners(&self) -> bool {
         let averages = matches!(self.machine.progress(), Progress::Waits(Wait::Averaging { .. }) | Progress::Complete);
         averages && self.request.options.frames >= capture::Scatter::LEAST_IMAGES
     }
 
     /// Tells where the board was in the last image that was taken in.
-    pub fn saw_board(&mut self, number: u64, corners: &[Corner]) {
+    pub(crate) fn saw_board(&mut self, number: u64, corners: &[Corner]) {
         self.machine.saw_board(number, corners);
     }
 
     /// See [`Machine::pass_time`].
-    pub fn pass_time(&mut self, now_s: f64, camera_heard_s: Option<f64>) {
+    pub(crate) fn pass_time(&mut self, now_s: f64, camera_heard_s: Option<f64>) {
         self.machine.pass_time(now_s, camera_heard_s);
     }
 
     /// What it waits for, or why it has ended.
-    pub fn state(&self) -> Result<CaptureWait, Why> {
+    pub(crate) fn state(&self) -> Result<CaptureWait, Why> {
         match self.machine.progress() {
             Progress::Waits(wait) => Ok(CaptureWait::Images(wait)),
             Progress::Complete => Ok(CaptureWait::Measuring),
@@ -102,7 +102,7 @@ impl Sequence {
 
     /// Looks for the target in the average with all effort; dots or markers that are not there may take seconds. `None`
     /// before all images are there.
-    pub fn measure(&self, cancel: &CancelToken) -> Option<Result<Measured, Why>> {
+    pub(crate) fn measure(&self, cancel: &CancelToken) -> Option<Result<Measured, Why>> {
         let (taken, last) = (self.machine.finish()?, self.last.as_ref()?);
         Some(match detect::observe_image(&taken.rgb, &self.target, cancel) {
             Err(error) => Err(refusal::not_searched(&error)),

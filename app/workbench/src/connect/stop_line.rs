@@ -40,7 +40,7 @@ impl StopLine {
     }
 
     /// Asks for a stop. What this program moves ends at once, and nothing is left that could begin afterwards.
-    pub fn press(&self) {
+    pub(crate) fn press(&self) {
         self.stops.ask();
         if let Some(ends) = self.ends().as_ref() {
             ends.desk.cancel((ends.clock)());
@@ -65,12 +65,12 @@ impl StopLine {
     }
 
     /// How many stops were pressed outside of the thread that draws.
-    pub fn outside(&self) -> u64 {
+    pub(crate) fn outside(&self) -> u64 {
         self.outside.asked()
     }
 
     /// The thread that draws has taken note of so many of them: what it asks for from now on was asked for after them.
-    pub fn note(&self, number: u64) {
+    pub(crate) fn note(&self, number: u64) {
         self.outside.finish(number);
     }
 

@@ -120,7 +120,7 @@ pub enum ChosenStep {
 
 impl GuideRequest {
     /// Chooses, for an arm that stands still. Takes some tenths of a second.
-    pub fn choose(&self, robot: &Robot, cancel: &CancelToken) -> Choice {
+    pub(crate) fn choose(&self, robot: &Robot, cancel: &CancelToken) -> Choice {
         let mut guide = self.guide.clone();
         let calibration = self.solved.as_ref().map(|solved| &solved.calibration);
         let known =
@@ -141,7 +141,7 @@ impl GuideRequest {
 }
 
 /// What a choice was, or why there is none.
-pub type ChoiceOutcome = Result<Box<Choice>, Text>;
+pub(crate) type ChoiceOutcome = Result<Box<Choice>, Text>;
 
 /// What is asked for, beyond captures that there are.
 pub(crate) fn options(goal_m: f64, views: usize) -> GuidedOptions {

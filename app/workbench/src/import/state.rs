@@ -83,7 +83,7 @@ impl Found {
     }
 
     /// The hypothesis that needs nobody to choose it.
-    pub fn decided(&self) -> Option<usize> {
+    pub(crate) fn decided(&self) -> Option<usize> {
         let verdict = self.judgement.as_ref().map(|judgement| &judgement.verdict);
         (verdict == Some(&Verdict::Decided)).then_some(0)
     }

@@ -73,7 +73,7 @@ impl ColouredDepth {
     ///
     /// # Errors
     /// As [`DepthImage::colours`].
-    pub fn new(
+    pub(crate) fn new(
         metres: DepthImage,
         map: ColourMap,
         [near_m, far_m]: [f32; 2],

@@ -41,7 +41,7 @@ pub enum Home {
 
 impl Home {
     /// Of what has no other place.
-    pub fn of(severity: Severity) -> Self {
+    pub(crate) fn of(severity: Severity) -> Self {
         match severity {
             Severity::Info => Self::StatusLine,
             Severity::Warning | Severity::Error => Self::Toast,
@@ -115,7 +115,7 @@ impl Messages {
     }
 
     /// What stands in a pane is no longer so.
-    pub fn is_over_in(&mut self, pane: Pane) {
+    pub(crate) fn is_over_in(&mut self, pane: Pane) {
         for message in self.kept.iter_mut().filter(|message| message.home == Home::Pane(pane)) {
             message.dismissed = true;
         }

@@ -155,16 +155,7 @@ pub enum ThemeChoice {
     Light,
 }
 
-impl ThemeChoice {
-    /// The one that this is not.
-    #[must_use]
-    pub fn other(self) -> Self {
-        match self {
-            Self::Dark => Self::Light,
-            Self::Light => Self::Dark,
-        }
-    }
-}
+impl ThemeChoice {}
 
 /// How the rotation of the tip is written.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -462,7 +453,7 @@ impl Model {
     }
 
     /// The camera on the tip, by the newest calibration; `None` without one, or for a camera beside the robot.
-    pub fn tip_from_camera(&self) -> Option<Pose<Tip, Camera>> {
+    pub(crate) fn tip_from_camera(&self) -> Option<Pose<Tip, Camera>> {
         match self.calibrated()?.hand_eye {
             HandEye::EyeInHand { tip_from_camera, .. } => Some(tip_from_camera),
             HandEye::EyeToHand { .. } => None,
@@ -481,7 +472,7 @@ impl Model {
     }
 
     /// Whether there may be a real arm: anywhere but in the built-in cell, also behind an address.
-    pub fn may_be_real(&self) -> bool {
+    pub(crate) fn may_be_real(&self) -> bool {
         !self.source.is_built_in()
     }
 
@@ -493,7 +484,7 @@ impl Model {
 
     /// Whether a move to the next pose of a sequence, or to a place that somebody chose by its name, waits until a person has seen
     /// how far it is. Where there may be a real arm the first one always does.
-    pub fn asks_before(&self, goal: &MotionGoal) -> bool {
+    pub(crate) fn asks_before(&self, goal: &MotionGoal) -> bool {
         // An arm that is only read refuses with the reason, and one that is there does not move.
         if !self.is_armed() || Way::to(goal, self).is_some_and(|way| way.is_none()) {
             return false;
@@ -554,7 +545,7 @@ impl Model {
 
 impl LinkState {
     /// The state before the first try.
-    pub fn first(source: &CellSource) -> Self {
+    pub(crate) fn first(source: &CellSource) -> Self {
         match source {
             CellSource::BuiltIn(_) => Self::StartingCell { why: None },
             CellSource::Address(address) => Self::Searching { address: address.clone(), attempt: 1, why: None },

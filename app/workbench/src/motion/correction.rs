@@ -34,7 +34,7 @@ pub fn expected_mm(model: &Model) -> Option<(f64, f64)> {
 }
 
 /// What goes with corrected commands, where these are expected to bring the tip nearer.
-pub fn helpful(model: &Model) -> Option<&Corrected> {
+pub(crate) fn helpful(model: &Model) -> Option<&Corrected> {
     let (solved, corrected) = corrected(model)?;
     solved.result.quality.correcting_helps().then_some(corrected)
 }
@@ -65,7 +65,7 @@ impl Correction {
     ///
     /// # Errors
     /// Why there is no such command.
-    pub fn command(&self, goal: &MotionGoal) -> Result<MotionGoal, Text> {
+    pub(crate) fn command(&self, goal: &MotionGoal) -> Result<MotionGoal, Text> {
         match goal {
             MotionGoal::Tip(wanted) => match self.arm.command(wanted, &self.near_rad) {
                 Ok(command) => Ok(MotionGoal::Tip(command.base_from_tip)),

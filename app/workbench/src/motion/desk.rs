@@ -59,7 +59,7 @@ pub enum MotionTask {
 
 impl MotionTask {
     /// Its number.
-    pub fn id(&self) -> MotionId {
+    pub(crate) fn id(&self) -> MotionId {
         match self {
             Self::Move(request) => request.id,
             Self::JogStep { id, .. } | Self::Follow { id, .. } | Self::Plan { id, .. } | Self::Guide { id, .. } => *id,
@@ -149,7 +149,7 @@ impl MotionQueue {
     }
 
     /// A jog button is held now. `true` when the worker has something to begin.
-    pub fn hold(&self, request: JogRequest, stop: &StopLine, now_s: f64) -> bool {
+    pub(crate) fn hold(&self, request: JogRequest, stop: &StopLine, now_s: f64) -> bool {
         let mut inner = self.inner();
         inner.owes_end = true;
         // The window does not know yet that it was let go.
@@ -170,7 +170,7 @@ impl MotionQueue {
     }
 
     /// No jog button is held now.
-    pub fn release(&self) {
+    pub(crate) fn release(&self) {
         let mut inner = self.inner();
         inner.line.release();
         // Pressed and let go before the worker looked, or held for longer than it meant anything.
@@ -180,19 +180,19 @@ impl MotionQueue {
     }
 
     /// What the arm is to keep out of, from its next motion on and over every connection.
-    pub fn keep_out(&self, keep_out: Arc<Surroundings>) {
+    pub(crate) fn keep_out(&self, keep_out: Arc<Surroundings>) {
         let mut inner = self.inner();
         inner.owed_keep_out = Some(Arc::clone(&keep_out));
         inner.keep_out = keep_out;
     }
 
     /// The same for the worker, once for each change and for each connection.
-    pub fn take_keep_out(&self) -> Option<Arc<Surroundings>> {
+    pub(crate) fn take_keep_out(&self) -> Option<Arc<Surroundings>> {
         self.inner().owed_keep_out.take()
     }
 
     /// Ends what moves, and forgets what was to move next.
-    pub fn cancel(&self, now_s: f64) {
+    pub(crate) fn cancel(&self, now_s: f64) {
         let mut inner = self.inner();
         let is_held = inner.bar_held(now_s);
         match &inner.doing {
@@ -209,13 +209,13 @@ impl MotionQueue {
     }
 
     /// Whether the arm is moved from here, or about to be.
-    pub fn is_busy(&self, now_s: f64) -> bool {
+    pub(crate) fn is_busy(&self, now_s: f64) -> bool {
         let mut inner = self.inner();
         !matches!(inner.doing, Doing::Nothing) || inner.connected && inner.line.request(now_s).is_some()
     }
 
     /// Hands over what the window has not heard.
-    pub fn take_messages(&self) -> Vec<Event> {
+    pub(crate) fn take_messages(&self) -> Vec<Event> {
         std::mem::take(&mut self.inner().reported)
     }
 
@@ -227,7 +227,7 @@ impl MotionQueue {
     }
 
     /// The worker has none now. What it had not begun is refused.
-    pub fn disconnected(&self, now_s: f64) {
+    pub(crate) fn disconnected(&self, now_s: f64) {
         let mut inner = self.inner();
         inner.connected = false;
         let is_held = inner.bar_held(now_s);
@@ -262,12 +262,12 @@ impl MotionQueue {
     }
 
     /// The motion or the jog is over.
-    pub fn done(&self) {
+    pub(crate) fn done(&self) {
         self.inner().doing = Doing::Nothing;
     }
 
     /// Whether a jog is still held.
-    pub fn is_held(&self, request: &JogRequest, now_s: f64) -> Held {
+    pub(crate) fn is_held(&self, request: &JogRequest, now_s: f64) -> Held {
         let now = Instant::now();
         if self.grip.is_firm(now) {
             return self.inner().line.is_held(request.jog, now_s);
@@ -277,7 +277,7 @@ impl MotionQueue {
 
     /// A jog is over: `why` says what ended it, if that was not its button, and `forgotten` after how long \[s\] in which
     /// nothing was heard of the button. `None` when another button is held already, which goes on without a word.
-    pub fn end_jog(
+    pub(crate) fn end_jog(
         &self,
         request: &JogRequest,
         why: Option<Text>,

@@ -74,7 +74,7 @@ impl Grip {
     }
 
     /// Whether what the window takes for held is held.
-    pub fn is_firm(&self, now: Instant) -> bool {
+    pub(crate) fn is_firm(&self, now: Instant) -> bool {
         let mut inner = self.inner();
         inner.count_silence(now);
         !inner.is_silent && inner.known == inner.times.let_go

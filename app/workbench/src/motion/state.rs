@@ -28,7 +28,7 @@ impl MotionRequest {
     ///
     /// # Errors
     /// Why no command takes the tip there.
-    pub fn goal(&self) -> Result<MotionGoal, Text> {
+    pub(crate) fn goal(&self) -> Result<MotionGoal, Text> {
         self.correction.as_ref().map_or_else(|| Ok(self.goal), |correction| correction.command(&self.goal))
     }
 }

@@ -9,7 +9,7 @@ use handeye_wording::text;
 
 /// Way of a joint [rad, m of a prismatic one] by which an arm that stands may differ from itself: less than the free space
 /// about a planned way at a reach of 2 m.
-pub const STANDS: f64 = 5e-3;
+pub(crate) const STANDS: f64 = 5e-3;
 /// And of the tip \[m\], as a settled arm is told by elsewhere; its turn \[rad\] is that of a joint.
 const STANDS_M: f64 = 5e-4;
 

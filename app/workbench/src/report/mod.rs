@@ -22,7 +22,7 @@ use handeye_wording::{English, decimals, shown};
 
 /// What is said of one thing. Numbers have their units.
 #[derive(Debug, Clone, Default)]
-pub struct Section {
+pub(crate) struct Section {
     /// What it is; nothing for the findings, which speak for themselves.
     pub title: String,
     /// In short, what is said of it.
@@ -54,7 +54,7 @@ impl Line {
 }
 
 /// All of it, the most important first.
-pub fn sections(solved: &Solved) -> Vec<Section> {
+pub(crate) fn sections(solved: &Solved) -> Vec<Section> {
     let result = &solved.result;
     let mut all = vec![headline(result), findings(result)];
     all.extend(

@@ -45,7 +45,7 @@ impl SessionThreads {
     ///
     /// # Errors
     /// When the system has no more threads.
-    pub fn start(sessions: PathBuf, clock: &Clock, waker: &Waker) -> io::Result<Self> {
+    pub(crate) fn start(sessions: PathBuf, clock: &Clock, waker: &Waker) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
         let (archive, archive_tasks) = Requests::with_limit(MAX_REQUESTS);
@@ -83,19 +83,19 @@ impl SessionThreads {
     }
 
     /// Hands over what was reported since the last time. Never waits.
-    pub fn drain(&self, mut absorb: impl FnMut(Event)) {
+    pub(crate) fn drain(&self, mut absorb: impl FnMut(Event)) {
         for event in self.events.try_iter().take(MAX_EVENTS) {
             absorb(event);
         }
     }
 
     /// Where captures are handed in.
-    pub fn captures(&self) -> Sender<Measured> {
+    pub(crate) fn captures(&self) -> Sender<Measured> {
         self.captures.clone()
     }
 
     /// Where new sessions go.
-    pub fn sessions(&self) -> &Path {
+    pub(crate) fn sessions(&self) -> &Path {
         &self.sessions
     }
 
@@ -103,7 +103,7 @@ impl SessionThreads {
     ///
     /// # Errors
     /// [`Busy`] when the disk does not keep up.
-    pub fn archive(&self, task: ArchiveTask) -> Result<(), Busy> {
+    pub(crate) fn archive(&self, task: ArchiveTask) -> Result<(), Busy> {
         self.archive.ask(task)
     }
 
@@ -111,42 +111,42 @@ impl SessionThreads {
     ///
     /// # Errors
     /// [`Busy`] when the disk does not keep up.
-    pub fn files(&self, task: FileTask) -> Result<(), Busy> {
+    pub(crate) fn files(&self, task: FileTask) -> Result<(), Busy> {
         self.files.ask(task)
     }
 
     /// Has captures looked at, these alone.
-    pub fn observe(&mut self, job: ObserveJob) {
+    pub(crate) fn observe(&mut self, job: ObserveJob) {
         self.observer.submit(job);
     }
 
     /// Has a set solved, this one alone.
-    pub fn solve(&mut self, job: SolveJob) {
+    pub(crate) fn solve(&mut self, job: SolveJob) {
         self.solver.submit(job);
     }
 
     /// Has the next view chosen for a person who moves the robot.
-    pub fn choose_view(&mut self, job: HandJob) {
+    pub(crate) fn choose_view(&mut self, job: HandJob) {
         self.chooser.submit(job);
     }
 
     /// Looks at a recording.
-    pub fn import(&mut self, job: ImportJob) {
+    pub(crate) fn import(&mut self, job: ImportJob) {
         self.importer.submit(job);
     }
 
     /// No longer.
-    pub fn cancel_import(&self) {
+    pub(crate) fn cancel_import(&self) {
         self.importer.cancel();
     }
 
     /// Cancels the solve.
-    pub fn cancel_solve(&self) {
+    pub(crate) fn cancel_solve(&self) {
         self.solver.cancel();
     }
 
     /// Cancels what only computes.
-    pub fn cancel_all(&self) {
+    pub(crate) fn cancel_all(&self) {
         self.observer.cancel();
         self.solver.cancel();
         self.chooser.cancel();
@@ -155,7 +155,7 @@ impl SessionThreads {
 
     /// Ends the threads, and waits for them no longer than until `end`. What was handed to the archive is still written;
     /// everything else is cancelled. Called again it does nothing.
-    pub fn end(&mut self, end: Instant) {
+    pub(crate) fn end(&mut self, end: Instant) {
         // All parts by their names: one that was left out here would be waited for in vain.
         let Self { archive, captures: _, files, observer, solver, chooser, importer, events, sessions: _, threads } =
             self;

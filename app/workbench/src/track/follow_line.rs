@@ -63,14 +63,14 @@ impl FollowLine {
     }
 
     /// What is tracked from now on, or that nothing is.
-    pub fn set_up(&self, by: Option<TrackedBy>) {
+    pub(crate) fn set_up(&self, by: Option<TrackedBy>) {
         let mut inner = self.inner();
         inner.by = by;
         (inner.newest, inner.rest) = (None, Rest::default());
     }
 
     /// An image was tracked.
-    pub fn see(&self, update: &Update) {
+    pub(crate) fn see(&self, update: &Update) {
         let mut inner = self.inner();
         inner.rest.see(update);
         inner.newest = Some(update.clone());
@@ -82,7 +82,7 @@ impl FollowLine {
     }
 
     /// The board as it is tracked now, for a camera on the tip; `None` while it is not known where it is.
-    pub fn board_in_view(&self) -> Option<BoardInView> {
+    pub(crate) fn board_in_view(&self) -> Option<BoardInView> {
         let inner = self.inner();
         let setup = &inner.by.as_ref()?.setup;
         let HandEye::EyeInHand { tip_from_camera, .. } = setup.calibrated.hand_eye else { return None };
@@ -103,7 +103,7 @@ impl FollowLine {
     }
 
     /// The same after the arm was moved, when the board may have to be found again.
-    pub fn begin_elsewhere(&self, request: FollowRequest) {
+    pub(crate) fn begin_elsewhere(&self, request: FollowRequest) {
         self.begin(request);
         self.inner().patience_s = PATIENCE_S;
     }
@@ -119,7 +119,7 @@ impl FollowLine {
     }
 
     /// What the arm is to do in a pass.
-    pub fn request(&self, moment: &FollowMoment) -> ArmRequest {
+    pub(crate) fn request(&self, moment: &FollowMoment) -> ArmRequest {
         let mut inner = self.inner();
         if inner.waits(moment) {
             return ArmRequest::Rest;

@@ -131,7 +131,7 @@ pub struct BoardMotion {
 
 impl BoardMotion {
     /// As the cell is asked for it: with the sizes that it takes by itself.
-    pub fn of_cell(&self) -> cell::BoardMotion {
+    pub(crate) fn of_cell(&self) -> cell::BoardMotion {
         cell::BoardMotion::along(self.path, self.speed_m_s)
     }
 }

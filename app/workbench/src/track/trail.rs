@@ -16,7 +16,7 @@ pub struct Trail {
 
 impl Trail {
     /// The tip is at a point of the base now \[m\]. Keeps it where the tip has moved; what is no number is left out.
-    pub fn add(&mut self, point_m: [f64; 3]) {
+    pub(crate) fn add(&mut self, point_m: [f64; 3]) {
         let is_same = |last: &[f64; 3]| {
             let square: f64 = last.iter().zip(point_m).map(|(last, now)| (last - now).powi(2)).sum();
             square < LEAST_STEP_M * LEAST_STEP_M

@@ -29,7 +29,7 @@ impl TrackedBy {
 
     /// What to command so that the tip gets there, by what it is off at these joint values: nearby it is off by the same, so that an arm
     /// that comes to rest there is where it shall be. `None` as for [`Self::base_from_tip`].
-    pub fn command(&self, goal: Pose<Base, Tip>, joints_rad: &JointValues) -> Option<Pose<Base, Tip>> {
+    pub(crate) fn command(&self, goal: Pose<Base, Tip>, joints_rad: &JointValues) -> Option<Pose<Base, Tip>> {
         let Some(arm) = &self.arm else { return Some(goal) };
         let actual_from_reported = arm.actual(joints_rad).ok()?.inverse() * arm.arm.forward(joints_rad).ok()?;
         Some(goal * actual_from_reported)

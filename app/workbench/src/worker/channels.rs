@@ -16,7 +16,7 @@ use super::shared::Busy;
 /// Holds the newest value only. A value that nobody took before the next one came is dropped and counted: a slow
 /// window shows fewer images, never old ones, and the one who puts never waits.
 #[derive(Debug)]
-pub struct LatestSlot<T> {
+pub(crate) struct LatestSlot<T> {
     inner: Mutex<Inner<T>>,
 }
 
@@ -70,7 +70,7 @@ impl Bell {
 
 /// A [`LatestSlot`] for a thread that waits for the next value, and wants to know whether the one who puts is there.
 #[derive(Debug)]
-pub struct Tap<T> {
+pub(crate) struct Tap<T> {
     slot: LatestSlot<T>,
     bell: Bell,
     /// Bits of the time \[s\] at which the one who puts last had an answer from its source; not a number before.
@@ -121,17 +121,17 @@ impl<T> Requests<T> {
     ///
     /// # Errors
     /// [`Busy`] when too many wait, or nobody takes any.
-    pub fn ask(&self, request: T) -> Result<(), Busy> {
+    pub(crate) fn ask(&self, request: T) -> Result<(), Busy> {
         self.0.as_ref().map_or(Err(Busy), |sender| sender.try_send(request).map_err(|_refused| Busy))
     }
 
     /// Whether nothing can be asked for any more.
-    pub fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         self.0.is_none()
     }
 
     /// Nothing more is asked for from here: a thread that has done what waits can end.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.0 = None;
     }
 }
@@ -151,7 +151,7 @@ impl<T> Clone for Requests<T> {
 
 /// Counts what is asked for and up to where it is done. What is asked for while it is being done is not lost.
 #[derive(Debug, Default)]
-pub struct Counter {
+pub(crate) struct Counter {
     asked: AtomicU64,
     done: AtomicU64,
 }

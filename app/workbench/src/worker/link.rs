@@ -37,7 +37,7 @@ pub struct Outlet {
 
 impl Outlet {
     /// Reports an event.
-    pub fn report(&self, event: impl Into<Event>) {
+    pub(crate) fn report(&self, event: impl Into<Event>) {
         let event = event.into();
         if self.events.send(event).is_err() {
             tracing::debug!("the window has gone");
@@ -46,12 +46,12 @@ impl Outlet {
     }
 
     /// Tells the user something.
-    pub fn notice(&self, severity: Severity, text: Text) {
+    pub(crate) fn notice(&self, severity: Severity, text: Text) {
         self.report(messages::Event::Notice { severity, text });
     }
 
     /// The present time \[s\].
-    pub fn now_s(&self) -> f64 {
+    pub(crate) fn now_s(&self) -> f64 {
         (self.clock)()
     }
 }

@@ -73,7 +73,7 @@ use reconnect::Reconnect;
 use vision::{Vision, VisionSlots};
 
 /// The application's end of the workers.
-pub struct Workers {
+pub(crate) struct Workers {
     control: Requests<Request<ControlTask>>,
     camera: Requests<Request<CameraTask>>,
     motion: Requests<Request<MotionLook>>,
@@ -221,7 +221,7 @@ impl Workers {
     /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
     /// worker's connection, whoever moves the arm. A motion or a jog of this program ends as well, and nothing is left
     /// that could begin afterwards.
-    pub fn press_stop(&self) {
+    pub(crate) fn press_stop(&self) {
         self.stop.press();
     }
 
@@ -275,7 +275,7 @@ impl Workers {
     ///
     /// # Errors
     /// As [`Self::move_to`].
-    pub fn plan_views(&self, id: MotionId, request: ViewsRequest) -> Result<(), Busy> {
+    pub(crate) fn plan_views(&self, id: MotionId, request: ViewsRequest) -> Result<(), Busy> {
         self.begin(MotionTask::Plan { id, request: Box::new(request) })
     }
 
@@ -289,14 +289,14 @@ impl Workers {
     }
 
     /// Ends the motion that is under way, without a stop of everything else.
-    pub fn cancel_motion(&self) {
+    pub(crate) fn cancel_motion(&self) {
         self.desk.cancel(self.now_s());
     }
 
     /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
     /// stops by itself after [`HELD_S`]. [`JogEnded`](crate::motion::Event::JogEnded) tells that the arm stands: when the
     /// jog ends, and once more when a button is let go that had been held for longer.
-    pub fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
+    pub(crate) fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
         let request = JogRequest { jog, tip_from_camera, speed };
         if self.desk.hold(request, &self.stop, self.now_s()) {
             self.wake_motion();
@@ -304,7 +304,7 @@ impl Workers {
     }
 
     /// No jog button is held now.
-    pub fn release_jog(&self) {
+    pub(crate) fn release_jog(&self) {
         self.desk.release();
     }
 
@@ -340,7 +340,7 @@ impl Workers {
     ///
     /// # Errors
     /// As [`Self::reconnect`].
-    pub fn stop_trying(&self) -> Result<(), Busy> {
+    pub(crate) fn stop_trying(&self) -> Result<(), Busy> {
         self.connector.iter().for_each(|connector| connector.rest());
         self.look_at_connection()
     }
@@ -354,7 +354,7 @@ impl Workers {
     ///
     /// # Errors
     /// [`Busy`] when it does not take requests.
-    pub fn ask_control(&self, request: Request<ControlTask>) -> Result<(), Busy> {
+    pub(crate) fn ask_control(&self, request: Request<ControlTask>) -> Result<(), Busy> {
         self.control.ask(request)
     }
 
@@ -362,7 +362,7 @@ impl Workers {
     ///
     /// # Errors
     /// [`Busy`] when it does not take requests.
-    pub fn ask_camera(&self, request: Request<CameraTask>) -> Result<(), Busy> {
+    pub(crate) fn ask_camera(&self, request: Request<CameraTask>) -> Result<(), Busy> {
         self.camera.ask(request)
     }
 
@@ -370,7 +370,7 @@ impl Workers {
     ///
     /// # Errors
     /// [`Busy`] when it does not take requests.
-    pub fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
+    pub(crate) fn ask_vision(&self, task: VisionTask) -> Result<(), Busy> {
         self.vision.ask(task)
     }
 
@@ -381,7 +381,7 @@ impl Workers {
 
     /// Waits until this program does not move the arm and a stop that was asked for is done, but no longer than until
     /// `end`; whether it is so. What is reported meanwhile is lost: for the end of the program.
-    pub fn come_to_rest(&self, end: Instant) -> bool {
+    pub(crate) fn come_to_rest(&self, end: Instant) -> bool {
         loop {
             // A worker whose reports nobody takes would wait, and the arm go on.
             self.drain(|_lost| {});
@@ -395,7 +395,7 @@ impl Workers {
 
     /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
     /// within the deadline is left alone, so that the program can end; returns how many there are.
-    pub fn shut_down(&mut self, deadline: Duration) -> usize {
+    pub(crate) fn shut_down(&mut self, deadline: Duration) -> usize {
         self.shutdown.cancel();
         self.stop.lead_away_from(&self.desk);
         self.control.close();

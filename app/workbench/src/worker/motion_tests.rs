@@ -50,7 +50,7 @@ impl Bench {
     }
 
     /// The clock of the application shows another time.
-    pub fn set_clock(&self, now_s: f64) {
+    pub(crate) fn set_clock(&self, now_s: f64) {
         *self.now_s.lock().unwrap_or_else(PoisonError::into_inner) = now_s;
     }
 
@@ -73,7 +73,7 @@ impl Bench {
         }
     }
 
-    pub fn until_link(&mut self, link: Link, wanted: impl Fn(&LinkState) -> bool) -> LinkState {
+    pub(crate) fn until_link(&mut self, link: Link, wanted: impl Fn(&LinkState) -> bool) -> LinkState {
         self.until("a state of a connection", |event| match event {
             Event::Connect(connect::Event::Link { link: which, state }) if *which == link && wanted(state) => {
                 Some(state.clone())
@@ -91,7 +91,7 @@ impl Bench {
         })
     }
 
-    pub fn jog_ended(&mut self) -> Option<String> {
+    pub(crate) fn jog_ended(&mut self) -> Option<String> {
         self.until("the end of a jog", |event| match event {
             Event::Motion(motion::Event::JogEnded { why }) => {
                 Some(why.as_ref().map(|why| why.in_language(Language::English)))

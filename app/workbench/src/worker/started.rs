@@ -29,7 +29,7 @@ impl Started {
     }
 
     /// Whether it is at work.
-    pub fn is_running(&self) -> bool {
+    pub(crate) fn is_running(&self) -> bool {
         matches!(self.done.try_recv(), Err(TryRecvError::Empty))
     }
 

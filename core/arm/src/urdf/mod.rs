@@ -97,11 +97,6 @@ impl Urdf {
         read::read(text, file)
     }
 
-    /// Names of all links, in the order of the file.
-    pub fn links(&self) -> &[String] {
-        &self.links
-    }
-
     fn error(&self, joint: Option<&RawJoint>, problem: UrdfProblem) -> UrdfError {
         UrdfError { file: self.file.clone(), line: joint.map(|joint| joint.line), problem: Box::new(problem) }
     }

@@ -153,7 +153,7 @@ impl Calibration {
 
     /// How far the errors of the arm put the answer from where the camera really is on it, at a point where it saw the target, metres, where
     /// that is most of the stated error: more views do not lower it.
-    pub fn moved_by_arm_m(&self) -> Option<f64> {
+    pub(crate) fn moved_by_arm_m(&self) -> Option<f64> {
         let ([hand_eye, _], law) = self.of_links_by_arm()?;
         let point = &self.joint.as_ref()?.reference_point;
         let (moved_m, error_m) = (hand_eye.moved_m(point), self.error_95_m(point)?);

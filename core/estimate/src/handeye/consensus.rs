@@ -28,7 +28,7 @@ const NUMBERINGS: usize = 1 << (SET - 1);
 
 /// A start and the views whose target has to be numbered otherwise for it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Consensus {
+pub(crate) struct Consensus {
     /// The start.
     pub solution: ClosedFormSolution,
     /// Views, in ascending order, that fit better when the target is numbered from another corner, and the quarter turns.
@@ -40,7 +40,7 @@ pub struct Consensus {
 /// `candidates` are the closed forms on all views. `misfit(solution, view, quarters)` is how badly a view fits that is numbered by so
 /// many quarter turns otherwise, in pixels or any unit, not finite where it has no image; `turns` are the ways to number the target.
 /// `None` when no candidate has a finite misfit.
-pub fn consensus(
+pub(crate) fn consensus(
     pairs: &[PosePair],
     candidates: &[ClosedFormSolution],
     turns: &Turns,

@@ -12,7 +12,7 @@
 //! `anchor_from_mount_i * mount_from_camera * camera_from_target_i = anchor_from_target` for every view `i`.
 
 pub mod closed_form;
-pub mod consensus;
+pub(crate) mod consensus;
 pub(crate) mod draw;
 pub mod joint;
 pub mod motion;
@@ -99,7 +99,7 @@ impl HandEye {
     }
 
     /// From where the robot sees the target so.
-    pub fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
+    pub(crate) fn base_from_tip(&self, camera_from_target: &Pose<Camera, Target>) -> Pose<Base, Tip> {
         match *self {
             Self::EyeInHand { tip_from_camera, base_from_target } => {
                 base_from_target * camera_from_target.inverse() * tip_from_camera.inverse()

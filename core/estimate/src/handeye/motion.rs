@@ -20,11 +20,11 @@ pub const NO_ROTATION_RAD: f64 = 1f64.to_radians();
 
 /// Axes that spread by less than this, in radians, count as parallel. The error along the common axis is the error of the
 /// poses over the sine of the spread: at 1° half a millimetre becomes three centimetres.
-pub const PARALLEL_AXES_RAD: f64 = 1f64.to_radians();
+pub(crate) const PARALLEL_AXES_RAD: f64 = 1f64.to_radians();
 
 /// How the robot moved between the views of a session, over all pairs of views.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionSummary {
+pub(crate) struct MotionSummary {
     /// Number of views.
     pub views: usize,
     /// Largest turn between two views, radians, at most π.
@@ -57,7 +57,7 @@ pub struct MotionSummary {
 /// # Reference
 /// Tsai & Lenz 1989, section II (conditions for a unique solution), doi:10.1109/70.34770. The spread is ours: the
 /// arctangent of the ratio of the two largest root mean square turns.
-pub fn analyse(anchor_from_mount: &[Pose<Anchor, Mount>]) -> Result<MotionSummary, HandEyeError> {
+pub(crate) fn analyse(anchor_from_mount: &[Pose<Anchor, Mount>]) -> Result<MotionSummary, HandEyeError> {
     let views = anchor_from_mount.len();
     if views < MIN_VIEWS {
         return Err(HandEyeError::TooFewViews { got: views, need: MIN_VIEWS });

@@ -61,19 +61,11 @@ pub struct PartialHandEye {
     pub place_covariance: Matrix2<f64>,
 }
 
-impl PartialHandEye {
-    /// The name of the frame that carries the camera.
-    pub fn mount_name(&self) -> &'static str {
-        match self.mode {
-            Mode::EyeInHand => "tip",
-            Mode::EyeToHand => "base",
-        }
-    }
-}
+impl PartialHandEye {}
 
 impl PartialHandEye {
     /// What is known and what stays open, in a sentence.
-    pub fn text(&self) -> Text {
+    pub(crate) fn text(&self) -> Text {
         let (mount, target) = match self.mode {
             Mode::EyeInHand => (text!("tip"), text!("base")),
             Mode::EyeToHand => (text!("base"), text!("tip")),

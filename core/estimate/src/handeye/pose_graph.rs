@@ -51,7 +51,7 @@ pub struct Levels {
 
 impl Levels {
     /// Disagreement in rotation, radians.
-    pub fn rotation_rad(&self) -> f64 {
+    pub(crate) fn rotation_rad(&self) -> f64 {
         self.target_rad.hypot(self.robot_rad)
     }
 
@@ -163,7 +163,7 @@ pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGrap
 ///
 /// # Errors
 /// As [`refine`]; translations of the robot that are none tell no scale.
-pub fn refine_scaled(
+pub(crate) fn refine_scaled(
     pairs: &[PosePair],
     start: &ClosedFormSolution,
     scale: f64,

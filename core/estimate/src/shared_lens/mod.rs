@@ -57,7 +57,7 @@ pub struct SharedLens {
 
 impl SharedLens {
     /// Whether there is more than one lens, see [`OddSession::is_another_lens`].
-    pub fn has_others(&self) -> bool {
+    pub(crate) fn has_others(&self) -> bool {
         self.odd.iter().any(OddSession::is_another_lens)
     }
 }

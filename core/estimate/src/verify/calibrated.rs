@@ -143,7 +143,7 @@ impl Predictor {
     ///
     /// # Errors
     /// [`VerifyError::NotFinite`]; [`VerifyError::NoJoints`] where the errors of the arm are known and its joints are not.
-    pub fn base_from_tip(&self, view: &View) -> Result<Pose<Base, Tip>, VerifyError> {
+    pub(crate) fn base_from_tip(&self, view: &View) -> Result<Pose<Base, Tip>, VerifyError> {
         if !view.base_from_tip.is_finite() {
             return Err(VerifyError::NotFinite { name: view.name.clone() });
         }

@@ -84,7 +84,7 @@ impl DepthReport {
 
 impl DepthErrors {
     /// Whether a number is none of chance: a false alarm in one of a thousand depth cameras.
-    pub fn is_certain(&self, of: Estimated) -> bool {
+    pub(crate) fn is_certain(&self, of: Estimated) -> bool {
         let law = StudentsT::new(0.0, 1.0, self.degrees_of_freedom.max(1) as f64);
         law.is_ok_and(|law| of.value.abs() > of.sigma * law.inverse_cdf(1.0 - 0.5 * FALSE_ALARM))
     }

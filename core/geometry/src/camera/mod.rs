@@ -18,7 +18,7 @@ pub use residual_distortion::ResidualDistortion;
 pub const MAX_PARAMETERS: usize = 12;
 
 /// Derivative of a pixel by the camera's parameters; columns past [`Intrinsics::parameter_count`] are zero.
-pub type PixelByParameters = SMatrix<f64, 2, MAX_PARAMETERS>;
+pub(crate) type PixelByParameters = SMatrix<f64, 2, MAX_PARAMETERS>;
 
 /// What a camera model cannot do with a point or a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, handeye_wording::Localized)]
@@ -183,7 +183,7 @@ impl Intrinsics {
 
     /// [`Self::project_with_jacobians`] in plain numbers, for inner loops.
     #[inline]
-    pub fn linearise(&self, point: &Vector3<f64>) -> Result<LinearPixel, CameraError> {
+    pub(crate) fn linearise(&self, point: &Vector3<f64>) -> Result<LinearPixel, CameraError> {
         let d = self.distortion.linearise(point)?;
         let focal = |[x, y]: [f64; 2]| [self.fx * x, self.fy * y];
         let [x, y] = d.value;

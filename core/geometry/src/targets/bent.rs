@@ -95,7 +95,7 @@ impl BoardPoints {
     }
 
     /// How a point moves along z with either warp, and how it moves with the scale.
-    pub fn derivatives(&self, index: usize, shape: &BoardShape) -> ([f64; 2], Vector3<f64>) {
+    pub(crate) fn derivatives(&self, index: usize, shape: &BoardShape) -> ([f64; 2], Vector3<f64>) {
         let by_warp = self.sag[index].map(|s| s * shape.scale);
         (by_warp, self.point(index, shape).coords / shape.scale)
     }

@@ -33,7 +33,7 @@ impl CornerCovariance {
     }
 
     /// Number of corners.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.whitener.nrows() / 2
     }
 
@@ -54,7 +54,7 @@ impl CornerCovariance {
     }
 
     /// That of some of the corners, in the order of their numbers here.
-    pub fn of(&self, corners: &[usize]) -> Option<Self> {
+    pub(crate) fn of(&self, corners: &[usize]) -> Option<Self> {
         let kept: Vec<usize> = corners.iter().flat_map(|i| [2 * i, 2 * i + 1]).collect();
         let px2 = self.px2()?;
         Self::new(&px2.select_rows(&kept).select_columns(&kept))
@@ -62,14 +62,14 @@ impl CornerCovariance {
 
     /// The residuals of all corners, x and y of each in turn, one column or more, as residuals of independent corners with the
     /// variance `unit_px2`.
-    pub fn whitened(&self, residuals: &DMatrix<f64>, unit_px2: f64) -> DMatrix<f64> {
+    pub(crate) fn whitened(&self, residuals: &DMatrix<f64>, unit_px2: f64) -> DMatrix<f64> {
         &self.whitener * residuals * (unit_px2 / self.mean_px2).sqrt()
     }
 }
 
 /// The inverse of a lower triangular matrix; `None` where it has none. Of the identity as the right side half is zero, which a
 /// solution by columns of whole length goes through all the same.
-pub fn lower_inverse(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(crate) fn lower_inverse(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let size = lower.nrows();
     let mut inverse = DMatrix::identity(size, size);
     for j in 0..size {

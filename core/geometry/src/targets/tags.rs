@@ -167,7 +167,7 @@ pub struct AprilGrid {
 
 impl AprilGrid {
     /// The lattice of tag corners, see [`super::TargetSpec::grid`].
-    pub fn grid(&self) -> Grid {
+    pub(crate) fn grid(&self) -> Grid {
         let alone = self.columns == 1 && self.rows == 1;
         let square_m = if alone { self.tag_m } else { self.pitch_m() / 2.0 };
         Grid { columns: 2 * self.columns, rows: 2 * self.rows, square_m }

@@ -24,7 +24,7 @@ pub enum Need {
 
 impl Need {
     /// Its name in `$HANDEYE_REQUIRE`.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Data => "data",
             Self::Python => "python",

@@ -116,7 +116,7 @@ impl PredictedDepths {
 
 impl MeasuredDepths<'_> {
     /// Adds the three residuals of a view to its equations.
-    pub fn add_to(
+    pub(crate) fn add_to(
         &self,
         equations: &mut PoseEquations,
         seen: &ViewInput<'_>,

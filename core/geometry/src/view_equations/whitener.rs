@@ -42,7 +42,7 @@ impl Whitener {
     }
 
     /// Rows of all corners, x and y of each in turn, that are not whitened one by one; `None` where they are.
-    pub fn together(&self, rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    pub(crate) fn together(&self, rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         match self {
             Self::Together { covariance, unit_px2 } => Some(covariance.whitened(rows, *unit_px2)),
             Self::Alike | Self::Each(_) => None,

@@ -88,7 +88,7 @@ impl ViewRange {
     }
 
     /// Whether it is in spite of what is not known, with `doubts` times the usual margin for that.
-    pub fn surely_shows(&self, target: &TargetSpec, expected: &ExpectedPixels<'_>, doubt_factor: f64) -> bool {
+    pub(crate) fn surely_shows(&self, target: &TargetSpec, expected: &ExpectedPixels<'_>, doubt_factor: f64) -> bool {
         let intrinsics = expected.intrinsics();
         let inside = |point: &Point3<f64>| {
             expected

@@ -51,7 +51,7 @@ pub struct Robot {
 
 /// What is asked of a plan.
 #[derive(Debug, Clone, Copy)]
-pub struct ChooseOptions<'a> {
+pub(crate) struct ChooseOptions<'a> {
     /// Views that are compared.
     pub candidates: usize,
     /// How many views are planned ahead.
@@ -98,7 +98,7 @@ pub struct Plan {
 
 /// What a plan is made from.
 #[derive(Debug, Clone, Copy)]
-pub struct Chooser<'a> {
+pub(crate) struct Chooser<'a> {
     /// The model of the calibration so far.
     pub model: &'a ViewModel,
     /// The target.
@@ -166,7 +166,7 @@ impl Chooser<'_> {
     }
 
     /// A view at random that the arm gets to on a straight path in joint space.
-    pub fn at_random(&self, design: &Design, options: &ChooseOptions<'_>) -> Option<Proposal> {
+    pub(crate) fn at_random(&self, design: &Design, options: &ChooseOptions<'_>) -> Option<Proposal> {
         let mut pool = self.pool(design, options);
         let mut ways = 0;
         let found =
@@ -336,7 +336,7 @@ impl Robot {
     }
 
     /// Whether the arm touches nothing with these joint values, at which its tip is there, and is not between camera and board.
-    pub fn is_good(&self, joints: &JointValues, base_from_tip: &Pose<Base, Tip>) -> bool {
+    pub(crate) fn is_good(&self, joints: &JointValues, base_from_tip: &Pose<Base, Tip>) -> bool {
         let sees = |sight: &Sight| sight.is_free(&self.arm, joints, base_from_tip);
         self.arm.is_free(joints, &self.around, self.clearance_m) && self.sight.as_ref().is_none_or(sees)
     }
@@ -344,7 +344,7 @@ impl Robot {
     /// Whether the arm can be driven there on a straight path in joint space without touching anything. What it is nearer to than
     /// allowed where it stands it may go away from: the arm is there, and where the camera sits is an estimate that can be off
     /// by centimetres after the first turns.
-    pub fn path_is_free(&self, joints: &JointValues) -> bool {
+    pub(crate) fn path_is_free(&self, joints: &JointValues) -> bool {
         let guard = Guard::from(&self.arm, &self.around, &self.joints, self.clearance_m);
         guard.contact_on_path(&self.joints, joints).is_none()
     }

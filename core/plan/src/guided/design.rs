@@ -40,7 +40,7 @@ impl From<Matrix6<f64>> for Weight {
 impl Weight {
     /// Of a tool that is sent to a point, see [`Reach::weight`](handeye_estimate::reach_error::Reach::weight), with the hand-eye
     /// transform and the errors of the arm in these places.
-    pub fn of_reach(places: impl Iterator<Item = usize>, of: DMatrix<f64>) -> Self {
+    pub(crate) fn of_reach(places: impl Iterator<Item = usize>, of: DMatrix<f64>) -> Self {
         Self { places: places.collect(), of }
     }
 
@@ -72,7 +72,7 @@ pub fn weight_about(middle: &Point3<f64>, target: &TargetSpec) -> Matrix6<f64> {
 }
 
 /// `W` over points in camera coordinates \[m\], each counting alike.
-pub fn weight_over(points: &[Point3<f64>]) -> Matrix6<f64> {
+pub(crate) fn weight_over(points: &[Point3<f64>]) -> Matrix6<f64> {
     let sum: Matrix6<f64> = points.iter().map(point_error::by_hand_eye).map(|j| j.tr_mul(&j)).sum();
     sum / points.len().max(1) as f64
 }
@@ -94,7 +94,7 @@ impl Design {
     }
 
     /// Covariance of all unknowns.
-    pub fn covariance(&self) -> &DMatrix<f64> {
+    pub(crate) fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }
 
@@ -121,7 +121,7 @@ impl Design {
     }
 
     /// Of the diagonal parts of the criterion the one that lost most since `before`; what two of them have in common is in none.
-    pub fn part_of_gain(&self, before: &Self) -> Part {
+    pub(crate) fn part_of_gain(&self, before: &Self) -> Part {
         let gain = |places: std::ops::Range<usize>| {
             let of = |design: &Self| {
                 let Weight { places: all, of } = &design.weight;

@@ -32,7 +32,11 @@ const TURNS: [[f64; 3]; 8] = [
 
 /// How far the tip may be turned so that corners which are there now stay in the image, radians, for a focal length in
 /// pixels.
-pub fn free_turn_rad(corners_px: impl Iterator<Item = Vector2<f64>>, image_size: (u32, u32), focal_px: f64) -> f64 {
+pub(crate) fn free_turn_rad(
+    corners_px: impl Iterator<Item = Vector2<f64>>,
+    image_size: (u32, u32),
+    focal_px: f64,
+) -> f64 {
     let (width, height) = (f64::from(image_size.0), f64::from(image_size.1));
     let room_px = corners_px
         .map(|px| px.x.min(px.y).min(width - 1.0 - px.x).min(height - 1.0 - px.y))

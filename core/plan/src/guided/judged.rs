@@ -23,7 +23,7 @@ pub struct JudgedError {
 impl JudgedError {
     /// Of an answer, for a goal \[m\]: where the camera saw the board, or at the worst point of a box. `None` where nothing may be
     /// stated.
-    pub fn of(calibration: &Calibration, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Self> {
+    pub(crate) fn of(calibration: &Calibration, goal_m: f64, tool_box: Option<&TipBox>) -> Option<Self> {
         let promised = calibration.promised(goal_m, tool_box)?;
         let joint = calibration.joint.as_ref()?;
         if promised.of == Promise::Point {
@@ -50,7 +50,7 @@ impl JudgedError {
     }
 
     /// By which part of what it is now that which views lower has to become for the goal; `None` where no view gets there.
-    pub fn ratio_to(&self, goal_m: f64) -> Option<f64> {
+    pub(crate) fn ratio_to(&self, goal_m: f64) -> Option<f64> {
         let above = |error_m: f64| error_m * error_m - self.promised.least_m * self.promised.least_m;
         let (goal, now) = (above(goal_m), above(self.at_upper_levels_m));
         if now <= goal { Some(1.0) } else { (goal > 0.0).then(|| (goal / now).sqrt()) }

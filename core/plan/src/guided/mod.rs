@@ -22,7 +22,7 @@ pub mod design;
 pub mod fan;
 mod hold;
 mod judged;
-pub mod outlook;
+pub(crate) mod outlook;
 mod start;
 mod words;
 
@@ -50,7 +50,7 @@ use handeye_geometry::targets::TargetSpec;
 /// and with fewer the noise levels are hardly known.
 pub const LEAST_VIEWS: usize = FIELD_VIEWS;
 /// Gain of the best view \[part of the error\] below which more views are not worth their time.
-pub const LEAST_GAIN: f64 = 0.03;
+pub(crate) const LEAST_GAIN: f64 = 0.03;
 /// Captures that check the answer afterwards, where nobody says how many.
 pub const CHECKS: usize = 3;
 /// Part of the goal by which explanations that the answer does not count on may move it.

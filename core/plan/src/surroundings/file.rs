@@ -103,7 +103,7 @@ pub enum EntryFault {
 
 impl EntryFault {
     /// It in a sentence without its subject, with what to do.
-    pub fn text(&self) -> Text {
+    pub(crate) fn text(&self) -> Text {
         match self {
             Self::NotFinite { key } => text!("{key} is not finite", key = key),
             Self::Size { value } => {
@@ -258,7 +258,7 @@ impl KeepOutFile {
     ///
     /// # Errors
     /// [`SurroundingsError::Syntax`].
-    pub fn parse(file: &Path, text: &str) -> Result<Self, SurroundingsError> {
+    pub(crate) fn parse(file: &Path, text: &str) -> Result<Self, SurroundingsError> {
         toml::from_str(text).map_err(|error| SurroundingsError::Syntax {
             file: file.to_owned(),
             message: error.to_string().trim_end().to_owned(),
@@ -309,7 +309,7 @@ impl KeepOutBox {
     ///
     /// # Errors
     /// [`EntryFault`] says which value makes no sense.
-    pub fn obstacle(&self) -> Result<Obstacle, EntryFault> {
+    pub(crate) fn obstacle(&self) -> Result<Obstacle, EntryFault> {
         if self.name.trim().is_empty() {
             return Err(EntryFault::NoName);
         }

@@ -99,7 +99,7 @@ impl Obstacle {
 
 impl WorkVolume {
     /// How far inside a point of the base is, metres; below zero outside.
-    pub fn depth_m(&self, in_world: &Point3<f64>) -> f64 {
+    pub(crate) fn depth_m(&self, in_world: &Point3<f64>) -> f64 {
         (in_world - self.min_m).inf(&(self.max_m - in_world)).min()
     }
 }

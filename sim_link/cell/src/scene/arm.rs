@@ -56,7 +56,7 @@ impl ArmSpec {
     ///
     /// # Errors
     /// [`UrdfError`] names file, line and element.
-    pub fn arm(&self) -> Result<Arm, UrdfError> {
+    pub(crate) fn arm(&self) -> Result<Arm, UrdfError> {
         match self {
             Self::Kind(kind) => Ok(kind.arm()),
             Self::Urdf(UrdfSpec { urdf, base, tip, text }) => {
@@ -70,7 +70,7 @@ impl ArmSpec {
     }
 
     /// The name of one that is built in.
-    pub fn kind(&self) -> Option<ArmKind> {
+    pub(crate) fn kind(&self) -> Option<ArmKind> {
         match self {
             Self::Kind(kind) => Some(*kind),
             Self::Urdf(_) => None,

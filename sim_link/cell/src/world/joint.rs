@@ -95,7 +95,7 @@ impl Joint {
     }
 
     /// A revolute kinematic joint at 0, or at the end of its range that is nearest to 0.
-    pub fn new(min_rad: f64, max_rad: f64) -> Self {
+    pub(crate) fn new(min_rad: f64, max_rad: f64) -> Self {
         let position_rad = 0.0_f64.max(min_rad).min(max_rad);
         Self {
             kind: JointKind::Revolute,
@@ -133,7 +133,7 @@ impl Joint {
     }
 
     /// Whether a target position was set that it has not been moved to: a kinematic joint refuses positions then.
-    pub fn is_driven(&self) -> bool {
+    pub(crate) fn is_driven(&self) -> bool {
         self.drive.is_some()
     }
 
@@ -203,7 +203,7 @@ impl Joint {
     }
 
     /// Brakes a motion to a target position as fast as its limits allow, and lets a joint that is stuck be moved again.
-    pub fn brake(&mut self) {
+    pub(crate) fn brake(&mut self) {
         if self.mode == JointMode::Dynamic {
             self.target_rad = self.position_rad;
         }

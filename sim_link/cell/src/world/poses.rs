@@ -16,9 +16,9 @@ pub const HANDLE_PARENT: Handle = -11;
 /// `sim.handle_inverse`.
 pub const HANDLE_INVERSE: Handle = -14;
 /// `sim.handleflag_reljointbaseframe`.
-pub const FLAG_JOINT_BASE: Handle = 0x0040_0000;
+pub(crate) const FLAG_JOINT_BASE: Handle = 0x0040_0000;
 /// `sim.handleflag_wxyzquat`.
-pub const FLAG_WXYZ: Handle = 0x0100_0000;
+pub(crate) const FLAG_WXYZ: Handle = 0x0100_0000;
 
 /// Coordinates beyond this \[m\] are a script's mistake, and their products would leave the range of numbers.
 const MAX_COORDINATE_M: f64 = 1e6;

@@ -7,7 +7,7 @@ use super::tree::{Kind, Tree};
 use crate::world::handle::Handle;
 
 /// Length of a pass in seconds that a new world has.
-pub const DEFAULT_TIME_STEP_S: f64 = 0.05;
+pub(crate) const DEFAULT_TIME_STEP_S: f64 = 0.05;
 
 /// Lengths of a pass that a client may set.
 const TIME_STEPS_S: std::ops::RangeInclusive<f64> = 1e-4..=1.0;
@@ -98,7 +98,7 @@ impl Simulation {
     ///
     /// # Errors
     /// While a simulation runs; for a length that is not between 0.1 ms and 1 s.
-    pub fn set_time_step(&mut self, time_step_s: f64) -> Result<(), WorldError> {
+    pub(crate) fn set_time_step(&mut self, time_step_s: f64) -> Result<(), WorldError> {
         if self.state != State::Stopped {
             return Err(WorldError::SimulationNotStopped);
         }

@@ -13,7 +13,7 @@ use super::sensor::VisionSensor;
 const FIRST_HANDLE: Handle = 15;
 
 /// Objects that a world takes; clients create dummies, and memory must stay bounded.
-pub const MAX_OBJECTS: usize = 10_000;
+pub(crate) const MAX_OBJECTS: usize = 10_000;
 
 /// Nesting that a world takes, which bounds every recursion over the tree.
 pub const MAX_DEPTH: usize = 128;
@@ -89,7 +89,7 @@ impl Object {
     }
 
     /// `parent_from_object`, where a parent joint's frame is the moving one.
-    pub fn local(&self) -> &Isometry3<f64> {
+    pub(crate) fn local(&self) -> &Isometry3<f64> {
         &self.local
     }
 }
@@ -175,7 +175,7 @@ impl Tree {
     }
 
     /// Every object in the order of creation, to change.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = (Handle, &mut Object)> {
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (Handle, &mut Object)> {
         self.objects.iter_mut().map(|(&handle, object)| (handle, object))
     }
 
@@ -278,7 +278,7 @@ impl Tree {
     ///
     /// # Errors
     /// [`WorldError::NoSuchObject`].
-    pub fn moving_pose(&self, handle: Handle, chain: Chain) -> Result<Isometry3<f64>, WorldError> {
+    pub(crate) fn moving_pose(&self, handle: Handle, chain: Chain) -> Result<Isometry3<f64>, WorldError> {
         Ok(self.world_pose(handle, chain)? * turn(self.get(handle)?))
     }
 
@@ -326,7 +326,7 @@ impl Tree {
     }
 
     /// The children of `parent`; of the scene for `None`.
-    pub fn level(&self, parent: Option<Handle>) -> &[Handle] {
+    pub(crate) fn level(&self, parent: Option<Handle>) -> &[Handle] {
         match parent {
             None => &self.roots,
             Some(parent) => self.objects.get(&parent).map_or(&[], |object| &object.children),

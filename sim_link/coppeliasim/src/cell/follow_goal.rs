@@ -45,7 +45,7 @@ impl Default for FollowLimits {
 impl FollowLimits {
     /// No faster than what stands around allows.
     #[must_use]
-    pub fn within(&self, limits: &SpeedLimits) -> Self {
+    pub(crate) fn within(&self, limits: &SpeedLimits) -> Self {
         Self { speed_m_s: limits.tip(self.speed_m_s), joint_speed_rad_s: limits.joint(self.joint_speed_rad_s), ..*self }
     }
 
@@ -53,7 +53,7 @@ impl FollowLimits {
     ///
     /// # Errors
     /// [`LinkError::BadMotion`] names what is not positive and finite, or a workspace without room.
-    pub fn validate(&self) -> Result<(), LinkError> {
+    pub(crate) fn validate(&self) -> Result<(), LinkError> {
         let limits = [
             ("the speed of the tip", self.speed_m_s),
             ("the acceleration of the tip", self.acceleration_m_s2),

@@ -90,7 +90,7 @@ impl CellPart {
         [Self::Arm, Self::Joints, Self::Tip, Self::Target, Self::Camera, Self::Depth, Self::Board];
 
     /// Its name in files and options.
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             Self::Arm => "arm",
             Self::Joints => "joints",
@@ -103,7 +103,7 @@ impl CellPart {
     }
 
     /// What it is, in words.
-    pub fn what(self) -> Text {
+    pub(crate) fn what(self) -> Text {
         match self {
             Self::Arm => text!("base of the arm"),
             Self::Joints => text!("joint of the arm"),

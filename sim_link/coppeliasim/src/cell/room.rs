@@ -135,7 +135,7 @@ impl ArmKinematics {
 
     /// Whether the tip can follow the board at a usual speed from these joints, wherever it goes within `reach` while its
     /// view is kept, touches nothing of what it is kept clear of, and sees the whole board also when that is there at once.
-    pub fn has_room_to_follow(
+    pub(crate) fn has_room_to_follow(
         &self,
         limits: &FollowLimits,
         board: &BoardInView,
@@ -156,7 +156,7 @@ impl ArmKinematics {
     ///
     /// # Errors
     /// [`NoPlace`].
-    pub fn place_to_follow(
+    pub(crate) fn place_to_follow(
         &self,
         limits: &FollowLimits,
         board: &BoardInView,

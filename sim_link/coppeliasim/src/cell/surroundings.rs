@@ -59,7 +59,7 @@ impl Among {
     }
 
     /// For places from which a motion is to keep the whole free space.
-    pub fn strict(&self) -> Guard<'_> {
+    pub(crate) fn strict(&self) -> Guard<'_> {
         Guard::strict(&self.arm, &self.around, self.clearance_m)
     }
 

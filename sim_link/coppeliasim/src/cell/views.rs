@@ -34,7 +34,7 @@ pub struct BoardInView {
 
 impl BoardInView {
     /// From the camera to the middle of the board when the tip is there \[m\].
-    pub fn distance_m(&self, base_from_tip: &Pose<Base, Tip>) -> f64 {
+    pub(crate) fn distance_m(&self, base_from_tip: &Pose<Base, Tip>) -> f64 {
         let camera_from_target = (*base_from_tip * self.tip_from_camera).inverse() * self.base_from_target;
         (camera_from_target.isometry() * self.target.centre()).coords.norm()
     }

@@ -90,7 +90,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_simulation_time_step(&mut self) -> Result<f64, LinkError> {
+    pub(crate) fn get_simulation_time_step(&mut self) -> Result<f64, LinkError> {
         self.call("sim.getSimulationTimeStep", Vec::new())?.number(0)
     }
 
@@ -126,23 +126,15 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn release_lock(&mut self) -> Result<(), LinkError> {
+    pub(crate) fn release_lock(&mut self) -> Result<(), LinkError> {
         self.call("sim.releaseLock", Vec::new()).map(drop)
-    }
-
-    /// Writes a line to the simulator's log at a level of [`crate::constants`].
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn add_log(&mut self, level: i64, line: &str) -> Result<(), LinkError> {
-        self.call("sim.addLog", vec![Value::from(level), Value::from(line)]).map(drop)
     }
 
     /// An integer setting of the simulator.
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_int_param(&mut self, id: i64) -> Result<i64, LinkError> {
+    pub(crate) fn get_int_param(&mut self, id: i64) -> Result<i64, LinkError> {
         self.call("sim.getInt32Param", vec![Value::from(id)])?.integer(0)
     }
 
@@ -150,7 +142,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn program_version(&mut self) -> Result<i64, LinkError> {
+    pub(crate) fn program_version(&mut self) -> Result<i64, LinkError> {
         self.get_int_param(INT_PROGRAM_VERSION)
     }
 }

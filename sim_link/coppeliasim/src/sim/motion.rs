@@ -37,7 +37,7 @@ impl MotionLimits {
     ///
     /// # Errors
     /// [`LinkError::BadMotion`].
-    pub fn validate(&self, count: usize) -> Result<(), LinkError> {
+    pub(crate) fn validate(&self, count: usize) -> Result<(), LinkError> {
         let kinds = [("velocity", &self.velocity), ("acceleration", &self.acceleration), ("jerk", &self.jerk)];
         for (what, values) in kinds {
             if values.len() != count {
@@ -103,7 +103,7 @@ impl Sim {
     ///
     /// # Errors
     /// [`LinkError::BadMotion`] for limits that are none; otherwise as for any call.
-    pub fn move_to_pose(&mut self, motion: &PoseMotion, options: &CallOptions) -> Result<(), LinkError> {
+    pub(crate) fn move_to_pose(&mut self, motion: &PoseMotion, options: &CallOptions) -> Result<(), LinkError> {
         self.motion_call(MOVE, motion, options).map(drop)
     }
 
@@ -111,7 +111,7 @@ impl Sim {
     ///
     /// # Errors
     /// [`LinkError::BadMotion`] for limits that are none; otherwise as for any call.
-    pub fn move_to_pose_init(&mut self, motion: &PoseMotion) -> Result<MotionState, LinkError> {
+    pub(crate) fn move_to_pose_init(&mut self, motion: &PoseMotion) -> Result<MotionState, LinkError> {
         self.motion_call(INIT, motion, &CallOptions::default())?.into_map(0).map(MotionState)
     }
 
@@ -120,7 +120,7 @@ impl Sim {
     /// # Errors
     /// [`LinkError::MotionFailed`] when the motion generator gives up, [`LinkError::Forgotten`] when the server has
     /// forgotten it.
-    pub fn move_to_pose_step(&mut self, state: &mut MotionState) -> Result<MotionStatus, LinkError> {
+    pub(crate) fn move_to_pose_step(&mut self, state: &mut MotionState) -> Result<MotionStatus, LinkError> {
         let reply = self.call(STEP, vec![state.0.clone()]).map_err(LinkError::of_motion_step)?;
         let code = reply.integer(0)?;
         state.0 = reply.into_map(1)?;
@@ -136,7 +136,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn move_to_pose_cleanup(&mut self, state: MotionState) -> Result<(), LinkError> {
+    pub(crate) fn move_to_pose_cleanup(&mut self, state: MotionState) -> Result<(), LinkError> {
         self.call(CLEANUP, vec![state.0]).map(drop)
     }
 

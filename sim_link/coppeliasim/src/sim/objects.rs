@@ -2,11 +2,10 @@
 
 use ciborium::Value;
 use handeye_geometry::frames::Pose;
-use nalgebra::{Point3, Vector3};
 
 use super::{JointInterval, ObjectHandle, Sim};
 use crate::constants;
-use crate::convert::{seven_from_pose, twelve_from_pose};
+use crate::convert::seven_from_pose;
 use crate::error::LinkError;
 use handeye_wire as wire;
 
@@ -32,7 +31,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any failure but the object's absence.
-    pub fn find_object(&mut self, path: &str) -> Result<Option<ObjectHandle>, LinkError> {
+    pub(crate) fn find_object(&mut self, path: &str) -> Result<Option<ObjectHandle>, LinkError> {
         let options = wire::map([("noError", Value::from(true))]);
         let handle = self.call("sim.getObject", vec![Value::from(path), options])?.integer(0)?;
         Ok((handle >= 0).then_some(ObjectHandle(handle)))
@@ -42,7 +41,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call, as everywhere here.
-    pub fn get_object_alias(&mut self, object: ObjectHandle) -> Result<String, LinkError> {
+    pub(crate) fn get_object_alias(&mut self, object: ObjectHandle) -> Result<String, LinkError> {
         Ok(self.call("sim.getObjectAlias", vec![object.to_value()])?.text(0)?.to_owned())
     }
 
@@ -50,7 +49,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_object_path(&mut self, object: ObjectHandle) -> Result<String, LinkError> {
+    pub(crate) fn get_object_path(&mut self, object: ObjectHandle) -> Result<String, LinkError> {
         let args = vec![object.to_value(), Value::from(constants::ALIAS_SHORTEST_PATH)];
         Ok(self.call("sim.getObjectAlias", args)?.text(0)?.to_owned())
     }
@@ -60,7 +59,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_objects_in_tree(
+    pub(crate) fn get_objects_in_tree(
         &mut self,
         base: Option<ObjectHandle>,
         kind: i64,
@@ -76,7 +75,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_object_parent(&mut self, object: ObjectHandle) -> Result<Option<ObjectHandle>, LinkError> {
+    pub(crate) fn get_object_parent(&mut self, object: ObjectHandle) -> Result<Option<ObjectHandle>, LinkError> {
         let handle = self.call("sim.getObjectParent", vec![object.to_value()])?.integer(0)?;
         Ok((handle >= 0).then_some(ObjectHandle(handle)))
     }
@@ -85,7 +84,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_object_type(&mut self, object: ObjectHandle) -> Result<i64, LinkError> {
+    pub(crate) fn get_object_type(&mut self, object: ObjectHandle) -> Result<i64, LinkError> {
         self.call("sim.getObjectType", vec![object.to_value()])?.integer(0)
     }
 
@@ -93,25 +92,8 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_joint_type(&mut self, joint: ObjectHandle) -> Result<i64, LinkError> {
+    pub(crate) fn get_joint_type(&mut self, joint: ObjectHandle) -> Result<i64, LinkError> {
         self.call("sim.getJointType", vec![joint.to_value()])?.integer(0)
-    }
-
-    /// A new dummy of a size (m) at the origin of the world.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn create_dummy(&mut self, size_m: f64) -> Result<ObjectHandle, LinkError> {
-        Ok(ObjectHandle(self.call("sim.createDummy", vec![Value::Float(size_m)])?.integer(0)?))
-    }
-
-    /// Removes objects from the scene.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn remove_objects(&mut self, objects: &[ObjectHandle]) -> Result<(), LinkError> {
-        let handles = wire::integers(objects.iter().map(|object| object.0));
-        self.call("sim.removeObjects", vec![handles]).map(drop)
     }
 
     /// The pose of `object` in `frame`; the caller states which frames these are.
@@ -140,60 +122,11 @@ impl Sim {
         self.call("sim.setObjectPose", vec![object.to_value(), frame.to_value(), value]).map(drop)
     }
 
-    /// As [`Self::get_object_pose`], asked for as a matrix.
-    ///
-    /// # Errors
-    /// As [`Self::get_object_pose`].
-    pub fn get_object_matrix<Dst, Src>(
-        &mut self,
-        object: ObjectHandle,
-        frame: ObjectHandle,
-    ) -> Result<Pose<Dst, Src>, LinkError> {
-        self.call("sim.getObjectMatrix", vec![object.to_value(), frame.to_value()])?.matrix(0)
-    }
-
-    /// As [`Self::set_object_pose`], sent as a matrix.
-    ///
-    /// # Errors
-    /// As [`Self::set_object_pose`].
-    pub fn set_object_matrix<Dst, Src>(
-        &mut self,
-        object: ObjectHandle,
-        frame: ObjectHandle,
-        pose: &Pose<Dst, Src>,
-    ) -> Result<(), LinkError> {
-        let value = wire::floats(twelve_from_pose(pose));
-        self.call("sim.setObjectMatrix", vec![object.to_value(), frame.to_value(), value]).map(drop)
-    }
-
-    /// The origin of `object` in `frame` (m).
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn get_object_position(&mut self, object: ObjectHandle, frame: ObjectHandle) -> Result<Point3<f64>, LinkError> {
-        let args = vec![object.to_value(), frame.to_value()];
-        Ok(Point3::from(self.call("sim.getObjectPosition", args)?.exactly::<3>(0)?))
-    }
-
-    /// Moves the origin of `object` to a point of `frame` (m), without turning it.
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn set_object_position(
-        &mut self,
-        object: ObjectHandle,
-        frame: ObjectHandle,
-        position_m: &Vector3<f64>,
-    ) -> Result<(), LinkError> {
-        let value = wire::floats(position_m.iter().copied());
-        self.call("sim.setObjectPosition", vec![object.to_value(), frame.to_value(), value]).map(drop)
-    }
-
     /// The position of a joint (rad, or m of a prismatic joint).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_joint_position(&mut self, joint: ObjectHandle) -> Result<f64, LinkError> {
+    pub(crate) fn get_joint_position(&mut self, joint: ObjectHandle) -> Result<f64, LinkError> {
         self.call("sim.getJointPosition", vec![joint.to_value()])?.number(0)
     }
 
@@ -202,7 +135,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn is_joint_dynamic(&mut self, joint: ObjectHandle) -> Result<bool, LinkError> {
+    pub(crate) fn is_joint_dynamic(&mut self, joint: ObjectHandle) -> Result<bool, LinkError> {
         Ok(self.call("sim.getJointMode", vec![joint.to_value()])?.integer(0)? == constants::JOINT_MODE_DYNAMIC)
     }
 
@@ -218,19 +151,11 @@ impl Sim {
         Ok(reply.integer(0) != Ok(0))
     }
 
-    /// Where the controller of a joint holds it or takes it (rad, or m of a prismatic joint).
-    ///
-    /// # Errors
-    /// Any [`LinkError`] of a call.
-    pub fn get_joint_target_position(&mut self, joint: ObjectHandle) -> Result<f64, LinkError> {
-        self.call("sim.getJointTargetPosition", vec![joint.to_value()])?.number(0)
-    }
-
     /// Tells the controller of a joint where to take it (rad, or m of a prismatic joint).
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn set_joint_target_position(&mut self, joint: ObjectHandle, position: f64) -> Result<(), LinkError> {
+    pub(crate) fn set_joint_target_position(&mut self, joint: ObjectHandle, position: f64) -> Result<(), LinkError> {
         self.call("sim.setJointTargetPosition", vec![joint.to_value(), Value::Float(position)]).map(drop)
     }
 
@@ -238,7 +163,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_joint_interval(&mut self, joint: ObjectHandle) -> Result<JointInterval, LinkError> {
+    pub(crate) fn get_joint_interval(&mut self, joint: ObjectHandle) -> Result<JointInterval, LinkError> {
         let reply = self.call("sim.getJointInterval", vec![joint.to_value()])?;
         // The second number is the length of the interval, not its end.
         let [min, length] = reply.exactly::<2>(1)?;

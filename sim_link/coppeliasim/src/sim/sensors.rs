@@ -30,7 +30,7 @@ pub struct SensorOptics {
 
 impl SensorOptics {
     /// The ideal pinhole camera that the sensor renders.
-    pub fn intrinsics(&self) -> Intrinsics {
+    pub(crate) fn intrinsics(&self) -> Intrinsics {
         Intrinsics::from_view_angle(self.width, self.height, self.view_angle_rad)
     }
 }
@@ -41,7 +41,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; [`LinkError::BadValue`] when buffer and size do not fit.
-    pub fn get_vision_sensor_image(&mut self, sensor: ObjectHandle) -> Result<RgbImage, LinkError> {
+    pub(crate) fn get_vision_sensor_image(&mut self, sensor: ObjectHandle) -> Result<RgbImage, LinkError> {
         let reply = self.call("sim.getVisionSensorImg", vec![sensor.to_value()])?;
         let (width, height) = reply.resolution(1)?;
         reply.checked(convert::rgb_from_bytes(reply.blob(0)?, width, height))
@@ -52,7 +52,7 @@ impl Sim {
     ///
     /// # Errors
     /// As [`Self::get_vision_sensor_image`].
-    pub fn get_vision_sensor_depth(&mut self, sensor: ObjectHandle) -> Result<DepthImage, LinkError> {
+    pub(crate) fn get_vision_sensor_depth(&mut self, sensor: ObjectHandle) -> Result<DepthImage, LinkError> {
         let args = vec![sensor.to_value(), Value::from(DEPTH_IN_METRES)];
         let reply = self.call("sim.getVisionSensorDepth", args)?;
         let (width, height) = reply.resolution(1)?;
@@ -63,7 +63,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_vision_sensor_resolution(&mut self, sensor: ObjectHandle) -> Result<(u32, u32), LinkError> {
+    pub(crate) fn get_vision_sensor_resolution(&mut self, sensor: ObjectHandle) -> Result<(u32, u32), LinkError> {
         self.call("sim.getVisionSensorRes", vec![sensor.to_value()])?.resolution(0)
     }
 
@@ -71,7 +71,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call; [`LinkError::UnexpectedReply`] when the object is no perspective vision sensor.
-    pub fn get_sensor_optics(&mut self, sensor: ObjectHandle) -> Result<SensorOptics, LinkError> {
+    pub(crate) fn get_sensor_optics(&mut self, sensor: ObjectHandle) -> Result<SensorOptics, LinkError> {
         let (width, height) = self.get_vision_sensor_resolution(sensor)?;
         let perspective = self.call("sim.getObjectInt32Param", parameter(sensor, VISION_PERSPECTIVE));
         // A server may not know this one parameter; only a definite no counts.
@@ -98,7 +98,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn handle_vision_sensors(&mut self) -> Result<(), LinkError> {
+    pub(crate) fn handle_vision_sensors(&mut self) -> Result<(), LinkError> {
         self.call("sim.handleVisionSensor", vec![Value::from(HANDLE_ALL_EXCEPT_EXPLICIT)]).map(drop)
     }
 }

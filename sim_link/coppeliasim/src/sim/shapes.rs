@@ -20,7 +20,7 @@ impl Sim {
     ///
     /// # Errors
     /// Any [`LinkError`] of a call.
-    pub fn get_shapes(&mut self, base: Option<ObjectHandle>) -> Result<Vec<ObjectHandle>, LinkError> {
+    pub(crate) fn get_shapes(&mut self, base: Option<ObjectHandle>) -> Result<Vec<ObjectHandle>, LinkError> {
         self.get_objects_in_tree(base, constants::OBJECT_SHAPE)
     }
 

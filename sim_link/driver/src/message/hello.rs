@@ -171,7 +171,7 @@ impl Hello {
     }
 
     /// Whether it can move the arm in any way.
-    pub fn can_move(&self) -> bool {
+    pub(crate) fn can_move(&self) -> bool {
         self.can(Ability::MoveJoints) || self.can(Ability::MoveTip)
     }
 

@@ -22,7 +22,7 @@ pub struct PoseMessage {
 
 impl PoseMessage {
     /// For the wire.
-    pub fn of<Dst: Frame, Src: Frame>(pose: &Pose<Dst, Src>) -> Self {
+    pub(crate) fn of<Dst: Frame, Src: Frame>(pose: &Pose<Dst, Src>) -> Self {
         Self { translation_m: pose.translation().into(), rotation_xyzw: pose.xyzw() }
     }
 
@@ -30,7 +30,7 @@ impl PoseMessage {
     ///
     /// # Errors
     /// [`BadMessage::Pose`] for a quaternion that is no rotation, or a translation of more than 100 m.
-    pub fn pose<Dst: Frame, Src: Frame>(&self, field: &'static str) -> Result<Pose<Dst, Src>, BadMessage> {
+    pub(crate) fn pose<Dst: Frame, Src: Frame>(&self, field: &'static str) -> Result<Pose<Dst, Src>, BadMessage> {
         let norm = self.rotation_xyzw.iter().map(|v| v * v).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > UNIT_TOLERANCE || !norm.is_finite() {
             return Err(BadMessage::Pose {

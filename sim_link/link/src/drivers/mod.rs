@@ -30,7 +30,7 @@ pub struct DrivenCell {
 
 impl DrivenCell {
     /// Nothing is started yet.
-    pub fn new(drivers: Drivers) -> Self {
+    pub(crate) fn new(drivers: Drivers) -> Self {
         let host = spec(&drivers).map(|spec| DriverHost::new(spec, DriverOptions::default()));
         Self { drivers, host, typed: TypedPose::default() }
     }

@@ -41,7 +41,7 @@ enum Server {
 impl RemoteCell {
     /// To the built-in cell with a scene, and with other errors of the arm where they are given; it is started when it is first
     /// connected to.
-    pub fn built_in(scene: SceneChoice, arm_errors: Option<ArmErrorsSpec>) -> Self {
+    pub(crate) fn built_in(scene: SceneChoice, arm_errors: Option<ArmErrorsSpec>) -> Self {
         Self { cell: Server::BuiltIn(scene, arm_errors), paths: CellPaths::default(), server: Mutex::new(None) }
     }
 

@@ -210,7 +210,7 @@ impl Canvas {
 
     /// The depths of the shapes in the order in which they are drawn, for tests.
     #[cfg(test)]
-    pub fn depths_m(&self) -> Vec<f64> {
+    pub(crate) fn depths_m(&self) -> Vec<f64> {
         let mut depths: Vec<f64> = self.items.iter().map(|item| item.depth_m).collect();
         depths.sort_by(|a, b| b.total_cmp(a));
         depths

@@ -52,7 +52,7 @@ pub struct Table {
 }
 
 impl Table {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let (tap, bell) = Tap::new();
         let tap = Arc::new(tap);
         let (sender, tasks) = bounded(8);
@@ -79,18 +79,18 @@ impl Table {
         Self { vision, tap, tasks: Some(sender), detections, measured, events, now_s, shutdown, frames: 0 }
     }
 
-    pub fn ask(&mut self, task: VisionTask) {
+    pub(crate) fn ask(&mut self, task: VisionTask) {
         self.tasks.as_ref().expect("open").send(task).expect("there is room");
         self.turn();
     }
 
     /// One turn; whether it goes on after it.
-    pub fn turn(&mut self) -> bool {
+    pub(crate) fn turn(&mut self) -> bool {
         self.vision.turn().is_ok()
     }
 
     /// Puts an image of the next pass in.
-    pub fn put(&mut self, rgb: &RgbImage) {
+    pub(crate) fn put(&mut self, rgb: &RgbImage) {
         self.frames += 1;
         let mut now_s = self.now_s.lock().expect("no panic");
         *now_s += 0.05;
@@ -117,7 +117,7 @@ impl Table {
     }
 
     /// Images until the capture has ended.
-    pub fn feed(&mut self, rgb: &RgbImage, most: usize) -> Result<Measured, CaptureRefused> {
+    pub(crate) fn feed(&mut self, rgb: &RgbImage, most: usize) -> Result<Measured, CaptureRefused> {
         for _ in 0..most {
             self.put(rgb);
             self.turn();
@@ -131,14 +131,14 @@ impl Table {
         Err(self.refused().expect("a capture ends with an image or a reason"))
     }
 
-    pub fn refused(&self) -> Option<CaptureRefused> {
+    pub(crate) fn refused(&self) -> Option<CaptureRefused> {
         self.events.try_iter().find_map(|event| match event {
             Event::Capture(capture::Event::Refused { refused, .. }) => Some(refused),
             _ => None,
         })
     }
 
-    pub fn waits(&self) -> Vec<(u64, CaptureWait)> {
+    pub(crate) fn waits(&self) -> Vec<(u64, CaptureWait)> {
         let waits = self.events.try_iter().filter_map(|event| match event {
             Event::Capture(capture::Event::Waits { number, wait }) => Some((number, wait)),
             _ => None,
@@ -148,7 +148,7 @@ impl Table {
 }
 
 /// All workers on a built-in cell, over sockets.
-pub struct CellBench {
+pub(crate) struct CellBench {
     pub workers: Workers,
     measured: Receiver<Measured>,
     woken: Receiver<()>,
@@ -159,7 +159,7 @@ pub struct CellBench {
 }
 
 impl CellBench {
-    pub fn start(scene: Scene, real_time: bool) -> Self {
+    pub(crate) fn start(scene: Scene, real_time: bool) -> Self {
         let config = CellConfig { real_time: Some(real_time), ..CellConfig::new(scene) };
         let server = CellServer::start(config).expect("a cell");
         let source = CellSource::Address(server.endpoint());
@@ -183,12 +183,12 @@ impl CellBench {
     }
 
     /// Another connection.
-    pub fn connect(&self) -> CellClient {
+    pub(crate) fn connect(&self) -> CellClient {
         connect(&self.server)
     }
 
     /// Asks for a capture and waits for what comes of it.
-    pub fn capture(&mut self, request: CaptureRequest) -> Result<Measured, CaptureRefused> {
+    pub(crate) fn capture(&mut self, request: CaptureRequest) -> Result<Measured, CaptureRefused> {
         let number = request.number;
         self.workers.ask_vision(VisionTask::Capture(request)).expect("it takes tasks");
         let deadline = crossbeam_channel::after(PATIENCE);
@@ -212,7 +212,7 @@ impl CellBench {
     }
 
     /// Live detections until so many have come.
-    pub fn live(&mut self, count: usize) -> Vec<LiveDetection> {
+    pub(crate) fn live(&mut self, count: usize) -> Vec<LiveDetection> {
         let mut found = Vec::new();
         while found.len() < count {
             self.woken.recv_timeout(PATIENCE).expect("images come");
@@ -226,7 +226,7 @@ impl CellBench {
     }
 
     /// Where the truth says that the corners are, seen from a pose of the tip.
-    pub fn projected(&self, base_from_tip: &Pose<Base, Tip>) -> Corners {
+    pub(crate) fn projected(&self, base_from_tip: &Pose<Base, Tip>) -> Corners {
         let base_from_target: Pose<Base, Target> = self.truth.base_from_target.expect("published");
         let camera: &Intrinsics = &self.truth.intrinsics;
         let camera_from_target = (*base_from_tip * self.truth.tip_from_camera).inverse() * base_from_target;
@@ -238,7 +238,7 @@ impl CellBench {
     }
 
     /// Largest distance of the corners of a capture from where the truth says that they are \[px\].
-    pub fn worst_px(&self, measured: &Measured) -> f64 {
+    pub(crate) fn worst_px(&self, measured: &Measured) -> f64 {
         let truth = self.projected(&measured.base_from_tip);
         measured.corners.iter().map(|corner| (corner.px - truth[corner.index].px).norm()).fold(0.0, f64::max)
     }

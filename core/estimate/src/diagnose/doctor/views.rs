@@ -103,7 +103,7 @@ struct Fit {
 
 impl SessionViews {
     /// Joints that are known in every view.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.views.iter().map(|v| v.tip_from_joints.len()).min().unwrap_or(0)
     }
 
@@ -259,7 +259,7 @@ impl SessionViews {
     }
 
     /// Number of lens parameters among the form's; the two warps follow.
-    pub fn lens_count(&self) -> usize {
+    pub(crate) fn lens_count(&self) -> usize {
         self.intrinsics.as_ref().map_or(0, Intrinsics::parameter_count)
     }
 }

@@ -97,7 +97,7 @@ impl Direction {
 
     /// The other one.
     #[must_use]
-    pub fn other(self) -> Self {
+    pub(crate) fn other(self) -> Self {
         match self {
             Self::Forward => Self::Inverse,
             Self::Inverse => Self::Forward,
@@ -150,7 +150,7 @@ impl Euler {
     /// All that are tried, roll pitch yaw and KUKA's first: the first number turns about the first axis named, outermost
     /// or innermost, in every order of axes; numbers for x, y and z in every order of the product; and those of two turns
     /// about one axis that controllers have.
-    pub fn all() -> Vec<Self> {
+    pub(crate) fn all() -> Vec<Self> {
         const ORDERS: [[u8; 3]; 6] = [[2, 1, 0], [0, 1, 2], [1, 0, 2], [2, 0, 1], [0, 2, 1], [1, 2, 0]];
         let mut all = vec![Self::RPY, Self::KUKA];
         let by_axis = ORDERS.map(|axes| Self { axes, columns: axes });
@@ -312,7 +312,7 @@ impl Reading {
 
     /// The numbers that a transform is written as, those that [`transform`](Self::transform) reads; `None` for matrices and products of
     /// turns other than roll, pitch and yaw.
-    pub fn numbers(&self, pose: &Isometry3<f64>) -> Option<Numbers> {
+    pub(crate) fn numbers(&self, pose: &Isometry3<f64>) -> Option<Numbers> {
         let [x, y, z] = (pose.translation.vector / self.length.metres()).into();
         let q = pose.rotation.coords;
         let angles = match self.rotation {

@@ -48,7 +48,7 @@ use agreement::{Agreement, agreement};
 use handeye_geometry::progress::Work;
 
 /// A smaller misfit is no gross fault: arms that are off by 3 mm half a metre away stay below.
-pub const CLEAR: f64 = 0.01;
+pub(crate) const CLEAR: f64 = 0.01;
 /// A hypothesis that explains the views has a smaller misfit, which is ten times that of such arms.
 pub const EXPLAINED: f64 = 0.05;
 /// And at the median a smaller angle \[rad\] than this: the same part of a turn by one radian.

@@ -9,7 +9,7 @@ use crate::handeye::PosePair;
 use crate::handeye::closed_form::ClosedFormSolution;
 
 /// Rows by which images and poses may be out of step: one image or pose that is missing or there twice, or two of them.
-pub const SHIFTS: [isize; 4] = [-1, 1, -2, 2];
+pub(crate) const SHIFTS: [isize; 4] = [-1, 1, -2, 2];
 /// Views on either side of a step at the least: fewer are outliers.
 pub const LEAST_BESIDE: usize = 3;
 /// Views that a solution of one side of a step rests on at the least.
@@ -31,7 +31,7 @@ pub struct Step {
 
 impl Step {
     /// How many rows further a view belongs.
-    pub fn further(&self, view: usize) -> isize {
+    pub(crate) fn further(&self, view: usize) -> isize {
         if view < self.from { self.before } else { self.after }
     }
 }
@@ -71,7 +71,7 @@ pub fn explains<H: Hypothesis>(
 
 /// The step that lets most views agree with the solution of one side of the session, by the hypotheses that all views belong so
 /// many rows further; `None` when the views are too few.
-pub fn best_step<H: Hypothesis>(shifted: impl Fn(isize) -> H) -> Option<Step> {
+pub(crate) fn best_step<H: Hypothesis>(shifted: impl Fn(isize) -> H) -> Option<Step> {
     let as_stated = shifted(0);
     let others = SHIFTS.map(|by| (by, shifted(by)));
     let (count, cap_m) = (as_stated.views(), CAP * as_stated.target().distance_m);

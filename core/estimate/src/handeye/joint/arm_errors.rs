@@ -159,7 +159,7 @@ impl ArmErrors {
     }
 
     /// All numbers: the slopes of the field, where there is one, then [`values`](Self::values).
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
         self.field.iter().flat_map(PoseDependentError::slopes).chain(&self.values).copied()
     }
 

@@ -220,7 +220,7 @@ impl PoseDependentError {
     /// Error of a reported tip pose: translation \[m\] and rotation vector \[rad\] in the axes of the tip. The true pose is
     /// `base_from_tip * (rho, exp(phi))`; with `p` the reported place, `R` the reported rotation and slopes `A`, `B` in the axes of the
     /// tip and `A'`, `B'` in those of the base, `rho = (A + Rᵀ A') (p - origin)` and `phi = (B + Rᵀ B') (p - origin)`.
-    pub fn correction(&self, base_from_tip: &Pose<Base, Tip>) -> Vector6<f64> {
+    pub(crate) fn correction(&self, base_from_tip: &Pose<Base, Tip>) -> Vector6<f64> {
         let by_slopes = self.columns(base_from_tip, &Matrix6::identity());
         let correction = by_slopes * DVectorView::from_slice(&self.slopes, self.slopes.len());
         Vector6::from_iterator(correction.iter().copied())

@@ -66,7 +66,7 @@ impl ErrorCurve {
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
-pub fn error_by_views<'a>(
+pub(crate) fn error_by_views<'a>(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
     work: impl Into<Work<'a>>,
@@ -142,7 +142,7 @@ fn spaced(first: usize, last: usize) -> Vec<usize> {
 
 /// What a solution expects of corners, RMS of 2-D distances in pixels over the views it was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ExpectedResiduals {
+pub(crate) struct ExpectedResiduals {
     /// By how much the robot's noise moves a corner.
     pub robot_px: f64,
     /// Residual of a view like these that was not in the fit, predicted from its reported robot pose: robot noise,
@@ -158,7 +158,7 @@ pub struct ExpectedResiduals {
 ///
 /// # Errors
 /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
-pub fn expected_residuals<'a>(
+pub(crate) fn expected_residuals<'a>(
     problem: &JointProblem<'_>,
     solution: &JointSolution,
     work: impl Into<Work<'a>>,

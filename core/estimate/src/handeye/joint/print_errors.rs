@@ -97,13 +97,13 @@ impl PrintErrors {
     }
 
     /// A target with these errors.
-    pub fn on(&self, drawn: &BoardPoints) -> BoardPoints {
+    pub(crate) fn on(&self, drawn: &BoardPoints) -> BoardPoints {
         drawn.displaced(&self.errors_m)
     }
 
     /// What is known of the errors before any view, as an information matrix in the order of the points along x and then along y: their
     /// most likely kinds, of the size that they were found to have. `board` has the errors.
-    pub fn prior_information(&self, board: &BoardPoints) -> Option<DMatrix<f64>> {
+    pub(crate) fn prior_information(&self, board: &BoardPoints) -> Option<DMatrix<f64>> {
         let kinds = self.kinds(board);
         let covariances = kinds.roots.iter().map(|(_, root)| root * root.transpose());
         let mean = covariances.reduce(|a, b| a + b)? / kinds.roots.len() as f64;

@@ -23,7 +23,7 @@ pub struct ShownEffects<'a> {
 impl ShownEffects<'_> {
     /// They, and what is known of their coefficients beforehand as an information matrix; `None` where that is singular. `board` has
     /// the errors of the print.
-    pub fn beforehand(self, board: &BoardPoints) -> Option<(Vec<Effect>, DMatrix<f64>)> {
+    pub(crate) fn beforehand(self, board: &BoardPoints) -> Option<(Vec<Effect>, DMatrix<f64>)> {
         let (mut effects, mut parts) = (Vec::new(), Vec::new());
         if let Some(print) = self.print {
             effects.push(Effect::Print);
@@ -48,7 +48,7 @@ impl ShownEffects<'_> {
     ///
     /// # Errors
     /// [`HandEyeError::Cancelled`]; [`HandEyeError::NoSolution`] when the solution is not one of the problem.
-    pub fn with_their_error(
+    pub(crate) fn with_their_error(
         self,
         problem: &JointProblem<'_>,
         mut solution: JointSolution,

@@ -92,17 +92,17 @@ impl JointSolution {
     }
 
     /// Covariance of the target's place `[t; r]`, right perturbation.
-    pub fn target_covariance(&self) -> Matrix6<f64> {
+    pub(crate) fn target_covariance(&self) -> Matrix6<f64> {
         self.covariance.fixed_view::<6, 6>(6, 6).into_owned()
     }
 
     /// Standard deviations of the free intrinsics in the order of [`Intrinsics::parameters`]; empty when fixed.
-    pub fn intrinsics_sigma(&self) -> Vec<f64> {
+    pub(crate) fn intrinsics_sigma(&self) -> Vec<f64> {
         self.lens_places().map(|i| self.sigma(i)).collect()
     }
 
     /// Covariance of the two warps, square metres; `None` when they were not estimated.
-    pub fn warp_covariance(&self) -> Option<nalgebra::Matrix2<f64>> {
+    pub(crate) fn warp_covariance(&self) -> Option<nalgebra::Matrix2<f64>> {
         let at = 12 + self.free.form().warp_at(&self.intrinsics);
         self.free.warp.then(|| self.covariance.fixed_view::<2, 2>(at, at).into_owned())
     }
@@ -113,7 +113,7 @@ impl JointSolution {
     }
 
     /// Covariance of the errors of the depths, in the order of [`DepthBias`]; zero when they were not estimated.
-    pub fn depth_covariance(&self) -> Matrix5<f64> {
+    pub(crate) fn depth_covariance(&self) -> Matrix5<f64> {
         let at = 12 + self.free.form().depth_at(&self.intrinsics);
         if self.free.depth { self.covariance.fixed_view::<5, 5>(at, at).into_owned() } else { Matrix5::zeros() }
     }
@@ -131,12 +131,12 @@ impl JointSolution {
     }
 
     /// Where the free intrinsics are in the covariance; empty when they are fixed.
-    pub fn lens_places(&self) -> Range<usize> {
+    pub(crate) fn lens_places(&self) -> Range<usize> {
         12..12 + self.free.form().warp_at(&self.intrinsics)
     }
 
     /// The reported tip pose of a view with what is known of the robot's errors taken out: those of its arm and its field.
-    pub fn base_from_tip(&self, view: &View) -> Pose<Base, Tip> {
+    pub(crate) fn base_from_tip(&self, view: &View) -> Pose<Base, Tip> {
         corrected_base_from_tip(view, self.arm.as_ref(), self.field.as_ref())
     }
 

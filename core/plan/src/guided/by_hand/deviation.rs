@@ -33,7 +33,7 @@ pub struct Deviation {
 
 impl Deviation {
     /// `None` where the middle of the board is not before the camera in one of the two.
-    pub fn between(
+    pub(crate) fn between(
         intrinsics: &Intrinsics,
         target: &TargetSpec,
         present: &Pose<Camera, Target>,
@@ -56,7 +56,7 @@ impl Deviation {
     }
 
     /// Whether it is as good as the one that is wanted.
-    pub fn is_near(&self) -> bool {
+    pub(crate) fn is_near(&self) -> bool {
         self.parts().into_iter().all(|(_, of_tolerance)| of_tolerance <= 1.0)
     }
 

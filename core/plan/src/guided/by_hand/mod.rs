@@ -12,7 +12,7 @@
 //! session without robot poses has no hand-eye calibration.
 
 mod deviation;
-pub mod first_views;
+pub(crate) mod first_views;
 
 pub use deviation::Deviation;
 
