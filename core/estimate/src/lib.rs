@@ -75,14 +75,13 @@
 //! | [`corrected_arm`] | where the tip of an arm with errors really is, and what to command instead |
 //! | [`reach_error`] | how near a tool arrives at a point that the camera saw |
 //! | [`robot_accuracy`] | the same where of the arm no more is known than how accurate it is |
-//! | [`clock_offset`], [`resolution`], [`shared_lens`], [`placement`] | clocks of camera and robot, resolution of poses, several cameras of a kind, an arm by its joint values |
+//! | [`resolution`], [`shared_lens`], [`placement`] | resolution of poses, several cameras of a kind, an arm by its joint values |
 //!
 //! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
 //! cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
 
 mod arm_fit;
 mod bend;
-pub mod clock_offset;
 mod corners;
 pub mod corrected_arm;
 mod detected_view;

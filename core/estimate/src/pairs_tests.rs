@@ -1,10 +1,12 @@
+use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3, Vector6};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::fit_with;
-use handeye_geometry::frames::Pose;
+use crate::{ObservedView, fit_with};
+use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::se3;
+use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::noise_twist;
 use handeye_simulate::session::{REALISTIC, camera, trial};
 
@@ -129,4 +131,49 @@ fn a_robot_that_only_turns_tells_no_unit() {
     let found = fit_with(&observations, Method::Joint, options, &CancelToken::default());
     let reported = found.map(|c| c.pose_fit.and_then(|fit| fit.shape?.scale_sigma));
     assert!(!matches!(reported, Ok(Some(sigma)) if sigma < 0.5), "{reported:?}");
+}
+
+#[test]
+fn turns_about_one_axis_are_refused_with_what_they_determine_in_both_modes() {
+    for mode in [Mode::EyeInHand, Mode::EyeToHand] {
+        let axis = Unit::new_normalize(Vector3::new(0.3, -0.5, 0.8));
+        let mount_from_camera = Pose::from_isometry(se3::exp(&Vector6::new(0.1, -0.2, 0.15, 0.8, -0.4, 1.1)));
+        let anchor_from_target = Pose::from_isometry(se3::exp(&Vector6::new(0.6, 0.3, -0.2, 0.2, 1.3, -0.7)));
+        let views = (0..12).map(|i| {
+            let k = f64::from(i);
+            let at = Translation3::new(0.2 * (2.1 * k).sin(), 0.2 * (1.3 * k).cos(), 0.2 * (0.7 * k).sin());
+            let turn = UnitQuaternion::from_axis_angle(&axis, 1.2 * (1.7 * k).sin());
+            let anchor_from_mount: Pose<Anchor, Mount> = Pose::from_isometry(at * turn);
+            let base_from_tip = match mode {
+                Mode::EyeInHand => anchor_from_mount.relabel(),
+                Mode::EyeToHand => anchor_from_mount.inverse().relabel(),
+            };
+            let seen: Pose<Camera, Target> =
+                mount_from_camera.inverse() * anchor_from_mount.inverse() * anchor_from_target;
+            let view = ObservedView::new(format!("{i}"), Some(base_from_tip), None);
+            ObservedView { camera_from_target: Some(seen), ..view }
+        });
+        let observations = Observations {
+            mode: Some(mode),
+            target: BOARD,
+            image_size: (640, 480),
+            camera: CameraKnowledge::NOTHING,
+            views: views.collect(),
+        };
+        let error = crate::fit(&observations, Method::Joint, &CancelToken::default()).expect_err("one axis");
+        let CalibrateError::OneAxis(found) = &error else { panic!("{error}") };
+        let place = [0, 1].map(|i| found.place_m[i] - found.across[i].dot(&mount_from_camera.translation()));
+        let turn = mount_from_camera.rotation().rotation_to(&found.rotation).angle();
+        assert!(place.iter().all(|off| off.abs() < 1e-7) && turn < 1e-7, "{place:?} {turn}");
+        assert_eq!(found.mode, mode);
+        assert!(found.open_axis.dot(&axis).abs() > 1.0 - 1e-12);
+        let is_across = |across: &Unit<Vector3<f64>>| across.dot(&found.open_axis).abs() < 1e-12;
+        assert!(found.across.iter().all(is_across), "nothing is said along the axis");
+        let text = error.to_string();
+        let mount = if mode == Mode::EyeInHand { "tip" } else { "base" };
+        assert!(
+            text.contains(&format!("of the {mount}: the position of the camera along it is not determined")),
+            "{text}"
+        );
+    }
 }

@@ -9,6 +9,7 @@
 //! Derivation: `docs/maths/resolution.md`.
 
 use crate::handeye::joint::Noise;
+pub(crate) use handeye_pairs::pose_graph::{ANGLE_RAD, PLACE_M};
 use handeye_wording::text;
 use handeye_wording::{Value, shown};
 
@@ -18,10 +19,6 @@ pub(crate) const CORNER_PX: f64 = 0.003;
 /// A distance of a corner, or the RMS of a view, that is as good as images get, pixels: the detector's own errors are 0.03 px at
 /// the most in images without noise, and 0.04 px RMS with ten grey levels of it.
 pub(crate) const FINE_PX: f64 = 0.05;
-/// A length that no robot resolves, metres: the best arms come back to a place within 0.01 to 0.02 mm (ISO 9283).
-pub(crate) const PLACE_M: f64 = 1e-5;
-/// An angle likewise, radians: a thousandth of a degree, which moves a point at half a metre by that length.
-pub(crate) const ANGLE_RAD: f64 = 1e-3 * std::f64::consts::PI / 180.0;
 /// A depth of the target's plane that no depth camera resolves, metres: a third of what a disparity known to a hundredth of a pixel is
 /// off (0.03 mm half a metre away, base line 75 mm, 1000 px), and as much as a robot resolves.
 pub(crate) const DEPTH_M: f64 = 1e-5;

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::formats::with_poses;
-use handeye_estimate::clock_offset::ClockOffsetError;
 use handeye_files::budget::Spent;
+use handeye_pairs::clock_offset::ClockOffsetError;
 use handeye_wording::Text;
 use handeye_wording::text;
 

@@ -8,11 +8,11 @@ use tempfile::TempDir;
 
 pub use super::conventions::Numbers;
 use super::conventions::{AngleUnit, Direction, LengthUnit, RotationForm};
-use handeye_estimate::clock_offset::ClockOffset;
 use handeye_estimate::handeye::Mode;
 use handeye_files::bounds::Bounds;
 use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::targets::TargetSpec;
+use handeye_pairs::clock_offset::ClockOffset;
 use handeye_wording::text;
 use handeye_wording::{Text, Value};
 

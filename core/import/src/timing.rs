@@ -13,12 +13,12 @@ use super::judge::Sights;
 use super::recording::{Clocks, ImageFile, Known, Motion, Numbers, Recording, Role, Sample, Stated, Stream, Track};
 use super::settings::Settings;
 use super::sight::Sight;
-use handeye_estimate::clock_offset::{ClockOffset, ClockOffsetError, clock_offset, pose_at};
 use handeye_estimate::diagnose::hypotheses::agreement::agreement;
 use handeye_estimate::diagnose::hypotheses::rules_out;
 use handeye_estimate::handeye::{PosePair, subset};
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::progress::CancelToken;
+use handeye_pairs::clock_offset::{ClockOffset, ClockOffsetError, clock_offset, pose_at};
 use handeye_wording::text;
 
 /// Clocks of one bag that are set by the network are apart by less.

@@ -1,8 +1,8 @@
 //! Streams of poses by two clocks.
 
-use handeye_estimate::clock_offset::{self, ClockOffsetError};
 use handeye_estimate::handeye::HandEyeError;
 use handeye_geometry::frames::{Anchor, Base, Camera, Frame, Mount, Pose, Target, Tip};
+use handeye_pairs::clock_offset::{self, ClockOffsetError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

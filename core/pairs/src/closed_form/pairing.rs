@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, SMatrix, SymmetricEigen, UnitQuater
 
 use super::linear::{RANK_TOLERANCE, Rows};
 use super::{ClosedFormSolution, Method, PosePair, check, with_mean_target};
-use crate::handeye::{HandEyeError, motion};
+use crate::{HandEyeError, motion};
 use handeye_geometry::frames::{Camera, Mount, Pose};
 
 /// Nearer to a half turn than this \[rad\] the noise of the poses (0.26° at most in real data) can put robot and camera

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, UnitQuaternion, Vector3};
 use super::linear::{RANK_TOLERANCE, Rows, rotation_up_to_scale, singular};
 use super::pairing::matrix;
 use super::{ClosedForm, ClosedFormSolution, Method, check};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 use handeye_geometry::frames::Pose;
 
 /// Estimates `mount_from_camera` and `anchor_from_target` from the views themselves, both rotations first.

@@ -17,9 +17,13 @@ use super::closed_form::ClosedFormSolution;
 use super::motion::MIN_VIEWS;
 use super::screening::{Judged, limit};
 use super::{HandEyeError, PosePair};
-use crate::resolution;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::se3;
+
+/// A length that no robot resolves, metres: the best arms come back to a place within 0.01 to 0.02 mm (ISO 9283).
+pub const PLACE_M: f64 = 1e-5;
+/// An angle likewise, radians: a thousandth of a degree, which moves a point at half a metre by that length.
+pub const ANGLE_RAD: f64 = 1e-3 * std::f64::consts::PI / 180.0;
 
 /// The estimate from pose pairs.
 #[derive(Debug, Clone)]
@@ -51,16 +55,16 @@ pub struct Levels {
 
 impl Levels {
     /// Disagreement in rotation, radians.
-    pub(crate) fn rotation_rad(&self) -> f64 {
+    pub fn rotation_rad(&self) -> f64 {
         self.target_rad.hypot(self.robot_rad)
     }
 
     /// None below what a robot resolves, see [`resolution`].
     fn judged_by(self) -> Self {
         Self {
-            position_m: self.position_m.max(resolution::PLACE_M),
-            target_rad: self.target_rad.max(resolution::ANGLE_RAD),
-            robot_rad: self.robot_rad.max(resolution::ANGLE_RAD),
+            position_m: self.position_m.max(PLACE_M),
+            target_rad: self.target_rad.max(ANGLE_RAD),
+            robot_rad: self.robot_rad.max(ANGLE_RAD),
         }
     }
 
@@ -91,13 +95,13 @@ impl PoseGraphSolution {
     }
 
     /// Where the chain puts the target in a pair.
-    pub(crate) fn predicted(&self, pair: &PosePair) -> Pose<Camera, Target> {
+    pub fn predicted(&self, pair: &PosePair) -> Pose<Camera, Target> {
         predict(pair, &self.mount_from_camera, &self.anchor_from_target)
     }
 
     /// How far every one of `pairs` is from what a solution from those `kept`, ascending, expects; `middle` is a point of the
     /// target, metres.
-    pub(crate) fn judge(&self, pairs: &[PosePair], kept: &[usize], middle: &Point3<f64>) -> Vec<Judged> {
+    pub fn judge(&self, pairs: &[PosePair], kept: &[usize], middle: &Point3<f64>) -> Vec<Judged> {
         let unknowns = 12 + usize::from(self.scale_sigma.is_some());
         let freedom = 0.5 * (6.0 * kept.len() as f64 - unknowns as f64);
         let limit = limit(pairs.len(), freedom.max(4.0));
@@ -123,7 +127,7 @@ impl PoseGraphSolution {
 }
 
 /// A pose with its translation multiplied.
-pub(crate) fn scaled(pose: &Pose<Camera, Target>, scale: f64) -> Pose<Camera, Target> {
+pub fn scaled(pose: &Pose<Camera, Target>, scale: f64) -> Pose<Camera, Target> {
     let mut isometry = *pose.isometry();
     isometry.translation.vector *= scale;
     Pose::from_isometry(isometry)
@@ -137,7 +141,7 @@ const STEP_TOLERANCE: f64 = 1e-10;
 const UNKNOWNS: usize = 13;
 const SCALE_AT: usize = 12;
 /// Name of the method in errors.
-pub(crate) const METHOD: &str = "the pose graph";
+pub const METHOD: &str = "the pose graph";
 /// Floor of the levels, so that exact data do not divide by zero.
 const LEVEL_FLOOR: f64 = 1e-12;
 /// Largest change of the log of a variance in a step.
@@ -163,7 +167,7 @@ pub fn refine(pairs: &[PosePair], start: &ClosedFormSolution) -> Result<PoseGrap
 ///
 /// # Errors
 /// As [`refine`]; translations of the robot that are none tell no scale.
-pub(crate) fn refine_scaled(
+pub fn refine_scaled(
     pairs: &[PosePair],
     start: &ClosedFormSolution,
     scale: f64,
@@ -271,7 +275,7 @@ impl PoseGraphSolution {
 
     /// How far on the way from `before` to `after`, two neighbours of these pairs, all of them would fit best, with both links
     /// free: 0 is here, 1 as far as `after` is from `before`. With its standard deviation; `None` where nothing tells it.
-    pub(crate) fn shift(&self, pairs: &[PosePair], before: &[PosePair], after: &[PosePair]) -> Option<(f64, f64)> {
+    pub fn shift(&self, pairs: &[PosePair], before: &[PosePair], after: &[PosePair]) -> Option<(f64, f64)> {
         let mut normal = SMatrix::<f64, 12, 12>::zeros();
         let (mut cross, mut gradient) = (SVector::<f64, 12>::zeros(), SVector::<f64, 12>::zeros());
         let (mut own, mut own_gradient) = (0.0, 0.0);
@@ -294,7 +298,7 @@ impl PoseGraphSolution {
 
     /// Minus twice the log-likelihood of each pair, without constants; one that is off by more than `most_off` standard deviations
     /// counts as one that is off by so many.
-    pub(crate) fn deviances(&self, pairs: &[PosePair], most_off: f64) -> Vec<f64> {
+    pub fn deviances(&self, pairs: &[PosePair], most_off: f64) -> Vec<f64> {
         let of_row = |row: Row| {
             let squared = row.error.dot(&(row.weight * row.error)).min(most_off.powi(2));
             squared - row.weight.determinant().ln()
@@ -381,7 +385,7 @@ fn predict(pair: &PosePair, x: &Pose<Mount, Camera>, y: &Pose<Anchor, Target>) -
 
 /// How far a pair, its target pose `scale` times as far away as stated, is from where a solution puts it; a radian counts as a
 /// metre.
-pub(crate) fn misfit(pair: &PosePair, solution: &ClosedFormSolution, scale: f64) -> f64 {
+pub fn misfit(pair: &PosePair, solution: &ClosedFormSolution, scale: f64) -> f64 {
     let predicted = predict(pair, &solution.mount_from_camera, &solution.anchor_from_target);
     residual(&scaled(&pair.camera_from_target, scale), &predicted).norm()
 }

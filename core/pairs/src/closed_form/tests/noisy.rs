@@ -7,8 +7,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::handeye::HandEyeError;
-use crate::handeye::closed_form::{all, by_name};
+use crate::HandEyeError;
+use crate::closed_form::{all, by_name};
 
 /// Metres and radians: as bad as poses of real sessions get.
 const NOISE: f64 = 0.005;

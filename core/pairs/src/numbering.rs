@@ -33,17 +33,17 @@ impl Turns {
     }
 
     /// The quarter turns of every way, that of the detection first.
-    pub(crate) fn quarters(&self) -> impl Iterator<Item = usize> + Clone {
+    pub fn quarters(&self) -> impl Iterator<Item = usize> + Clone {
         std::iter::once(0).chain(self.others.iter().map(|(quarters, _)| *quarters))
     }
 
     /// The motion of the target's frame by so many quarter turns; `None` where that is as it was detected.
-    pub(crate) fn motion(&self, quarters: usize) -> Option<&Isometry3<f64>> {
+    pub fn motion(&self, quarters: usize) -> Option<&Isometry3<f64>> {
         self.others.iter().find(|(known, _)| *known == quarters % 4).map(|(_, motion)| motion)
     }
 
     /// A pose in which something sees the target, counted otherwise.
-    pub(crate) fn turned<From: handeye_geometry::frames::Frame, To: handeye_geometry::frames::Frame>(
+    pub fn turned<From: handeye_geometry::frames::Frame, To: handeye_geometry::frames::Frame>(
         &self,
         pose: &Pose<From, To>,
         quarters: usize,
@@ -52,12 +52,12 @@ impl Turns {
     }
 
     /// Poses of the target under every other way to count it.
-    pub(crate) fn others(&self, seen: &Isometry3<f64>) -> impl Iterator<Item = Isometry3<f64>> {
+    pub fn others(&self, seen: &Isometry3<f64>) -> impl Iterator<Item = Isometry3<f64>> {
         self.others.iter().map(move |(_, motion)| seen * motion)
     }
 
     /// The pair with its target counted otherwise.
-    pub(crate) fn pair(&self, pair: &PosePair, quarters: usize) -> PosePair {
+    pub fn pair(&self, pair: &PosePair, quarters: usize) -> PosePair {
         PosePair { camera_from_target: self.turned(&pair.camera_from_target, quarters), ..*pair }
     }
 }
@@ -114,8 +114,8 @@ pub fn alike(pairs: &[PosePair], turns: &Turns) -> Vec<PosePair> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::handeye::Mode;
-    use crate::handeye::closed_form::{ClosedForm as _, ParkMartin};
+    use crate::Mode;
+    use crate::closed_form::{ClosedForm as _, ParkMartin};
     use handeye_geometry::targets::Grid;
     use handeye_simulate::session::{REALISTIC, camera, trial};
 

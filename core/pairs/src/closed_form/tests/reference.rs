@@ -5,8 +5,8 @@ use std::fs;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
-use crate::handeye::closed_form::by_name;
-use crate::handeye::{Mode, PosePair};
+use crate::closed_form::by_name;
+use crate::{Mode, PosePair};
 use handeye_geometry::frames::Pose;
 
 /// Largest difference in metres and in elements of the rotation matrix. Arithmetic alone leaves 3e-13. The margin is for

@@ -6,7 +6,7 @@ use super::linear::{Rows, rotation_of_size_one};
 use super::pairing::matrix;
 use super::shah::solution;
 use super::{ClosedForm, ClosedFormSolution, Method, check};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 
 /// Estimates `mount_from_camera` and `anchor_from_target` from the views themselves, in one linear system.
 ///

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3};
 use super::linear::Rows;
 use super::pairing::{self, Motion};
 use super::{ClosedForm, ClosedFormSolution, Method, check};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 use handeye_geometry::se3::skew;
 
 /// Motions whose chord `2 sin(θ/2)` is below this (17.3°) are left out, as OpenCV does since 4.10: their axes are

@@ -10,7 +10,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::ClosedFormSolution;
-use crate::handeye::PosePair;
+use crate::PosePair;
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 
 /// Noise-free data leave rounding alone: 1e-16 on metres and radians times a condition number of up to 1e5, which the

@@ -28,7 +28,7 @@ const NUMBERINGS: usize = 1 << (SET - 1);
 
 /// A start and the views whose target has to be numbered otherwise for it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Consensus {
+pub struct Consensus {
     /// The start.
     pub solution: ClosedFormSolution,
     /// Views, in ascending order, that fit better when the target is numbered from another corner, and the quarter turns.
@@ -40,7 +40,7 @@ pub(crate) struct Consensus {
 /// `candidates` are the closed forms on all views. `misfit(solution, view, quarters)` is how badly a view fits that is numbered by so
 /// many quarter turns otherwise, in pixels or any unit, not finite where it has no image; `turns` are the ways to number the target.
 /// `None` when no candidate has a finite misfit.
-pub(crate) fn consensus(
+pub fn consensus(
     pairs: &[PosePair],
     candidates: &[ClosedFormSolution],
     turns: &Turns,
@@ -127,7 +127,7 @@ mod tests {
     use nalgebra::Vector6;
 
     use super::*;
-    use crate::handeye::Mode;
+    use crate::Mode;
     use handeye_geometry::se3;
     use handeye_simulate::session::{REALISTIC, Session, camera, trial};
 

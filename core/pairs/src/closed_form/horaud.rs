@@ -2,7 +2,7 @@
 
 use super::pairing;
 use super::{ClosedForm, ClosedFormSolution};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 
 /// Estimates `mount_from_camera` from relative motions, the rotation first and the translation with it.
 ///

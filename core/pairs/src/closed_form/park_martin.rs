@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, UnitQuaternion};
 use super::linear::RANK_TOLERANCE;
 use super::pairing::{self, Motion};
 use super::{ClosedForm, ClosedFormSolution};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 use handeye_geometry::se3;
 
 /// Estimates `mount_from_camera` from relative motions, the rotation first and the translation with it.

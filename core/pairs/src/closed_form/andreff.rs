@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use super::linear::{Rows, rotation_of_size_one};
 use super::pairing::{self, Motion};
 use super::{ClosedForm, ClosedFormSolution, Method, check, with_mean_target};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 
 /// Estimates `mount_from_camera` from relative motions, rotation and translation in one linear system.
 ///

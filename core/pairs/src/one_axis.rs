@@ -61,11 +61,9 @@ pub struct PartialHandEye {
     pub place_covariance: Matrix2<f64>,
 }
 
-impl PartialHandEye {}
-
 impl PartialHandEye {
     /// What is known and what stays open, in a sentence.
-    pub(crate) fn text(&self) -> Text {
+    pub fn text(&self) -> Text {
         let (mount, target) = match self.mode {
             Mode::EyeInHand => (text!("tip"), text!("base")),
             Mode::EyeToHand => (text!("base"), text!("tip")),

@@ -10,11 +10,11 @@
 //! calibration on robotic datasets", FSR (angles of rotation for alignment); Rehder, Siegwart & Furgale 2016, "A general
 //! approach to spatiotemporal calibration in multisensor systems", IEEE T-RO 32 (the offset as one more unknown).
 
-use super::handeye::closed_form::{self, ClosedFormSolution};
-use super::handeye::consensus::consensus;
-use super::handeye::numbering::Turns;
-use super::handeye::pose_graph::{self, PoseGraphSolution, misfit};
-use super::handeye::{HandEyeError, PosePair, subset};
+use crate::closed_form::{self, ClosedFormSolution};
+use crate::consensus::consensus;
+use crate::numbering::Turns;
+use crate::pose_graph::{self, PoseGraphSolution, misfit};
+use crate::{HandEyeError, PosePair, subset};
 use handeye_geometry::frames::{Anchor, Camera, Mount, Pose, Target};
 use handeye_geometry::progress::CancelToken;
 use handeye_geometry::statistics::median;

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::handeye::HandEyeError;
-use crate::handeye::closed_form::{ClosedForm, all, by_name};
+use crate::HandEyeError;
+use crate::closed_form::{ClosedForm, all, by_name};
 
 fn truth() -> Truth {
     Truth {

@@ -20,11 +20,11 @@ pub const NO_ROTATION_RAD: f64 = 1f64.to_radians();
 
 /// Axes that spread by less than this, in radians, count as parallel. The error along the common axis is the error of the
 /// poses over the sine of the spread: at 1° half a millimetre becomes three centimetres.
-pub(crate) const PARALLEL_AXES_RAD: f64 = 1f64.to_radians();
+pub const PARALLEL_AXES_RAD: f64 = 1f64.to_radians();
 
 /// How the robot moved between the views of a session, over all pairs of views.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct MotionSummary {
+pub struct MotionSummary {
     /// Number of views.
     pub views: usize,
     /// Largest turn between two views, radians, at most π.
@@ -57,7 +57,7 @@ pub(crate) struct MotionSummary {
 /// # Reference
 /// Tsai & Lenz 1989, section II (conditions for a unique solution), doi:10.1109/70.34770. The spread is ours: the
 /// arctangent of the ratio of the two largest root mean square turns.
-pub(crate) fn analyse(anchor_from_mount: &[Pose<Anchor, Mount>]) -> Result<MotionSummary, HandEyeError> {
+pub fn analyse(anchor_from_mount: &[Pose<Anchor, Mount>]) -> Result<MotionSummary, HandEyeError> {
     let views = anchor_from_mount.len();
     if views < MIN_VIEWS {
         return Err(HandEyeError::TooFewViews { got: views, need: MIN_VIEWS });
@@ -102,12 +102,12 @@ pub(crate) fn analyse(anchor_from_mount: &[Pose<Anchor, Mount>]) -> Result<Motio
 }
 
 /// All pairs `i < j` of `views` views, in the order in which OpenCV visits them.
-pub(crate) fn pairs_of(views: usize) -> impl Iterator<Item = (usize, usize)> {
+pub fn pairs_of(views: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..views).flat_map(move |i| (i + 1..views).map(move |j| (i, j)))
 }
 
 /// `mount_j_from_mount_i`.
-pub(crate) fn relative(
+pub fn relative(
     anchor_from_mount_i: &Pose<Anchor, Mount>,
     anchor_from_mount_j: &Pose<Anchor, Mount>,
 ) -> Pose<Mount, Mount> {
@@ -115,7 +115,7 @@ pub(crate) fn relative(
 }
 
 /// Angle in [0, π] radians, exact at both ends and independent of the quaternion's sign.
-pub(crate) fn rotation_angle(rotation: &UnitQuaternion<f64>) -> f64 {
+pub fn rotation_angle(rotation: &UnitQuaternion<f64>) -> f64 {
     2.0 * rotation.imag().norm().atan2(rotation.w.abs())
 }
 
@@ -123,22 +123,25 @@ pub(crate) fn rotation_angle(rotation: &UnitQuaternion<f64>) -> f64 {
 ///
 /// Quaternion vectors enter in pairs, so neither their sign nor the direction of a half turn matters.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct AxisScatter {
+pub struct AxisScatter {
     moment: Matrix3<f64>,
     rotations: usize,
 }
 
-/// Eigenvectors of an [`AxisScatter`], strongest first; fields as in [`MotionSummary`].
+/// Eigenvectors of an [`AxisScatter`], strongest first.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PrincipalAxes {
+pub struct PrincipalAxes {
+    /// The axes, unit vectors.
     pub axes: [Vector3<f64>; 3],
+    /// RMS of the rotations about each, radians.
     pub rotations_rad: [f64; 3],
+    /// How far the axes are from a single one, radians: 0 where all are parallel.
     pub spread_rad: f64,
 }
 
 impl AxisScatter {
     /// Counts a rotation. Its axis matters only above [`NO_ROTATION_RAD`].
-    pub(crate) fn add(&mut self, rotation: &UnitQuaternion<f64>) {
+    pub fn add(&mut self, rotation: &UnitQuaternion<f64>) {
         self.rotations += 1;
         if rotation_angle(rotation) >= NO_ROTATION_RAD {
             let chord = 2.0 * rotation.imag();
@@ -147,7 +150,7 @@ impl AxisScatter {
     }
 
     /// Axes, strengths and spread; the spread is 0 when there was no rotation.
-    pub(crate) fn principal(&self) -> PrincipalAxes {
+    pub fn principal(&self) -> PrincipalAxes {
         let eigen = SymmetricEigen::new(self.moment);
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
@@ -162,7 +165,7 @@ impl AxisScatter {
     }
 
     /// Whether the rotations turn about at least two axes that are not parallel.
-    pub(crate) fn spans_two_axes(&self) -> bool {
+    pub fn spans_two_axes(&self) -> bool {
         self.principal().spread_rad >= PARALLEL_AXES_RAD
     }
 }

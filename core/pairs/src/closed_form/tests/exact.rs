@@ -6,8 +6,8 @@ use nalgebra::{Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::handeye::Mode;
-use crate::handeye::closed_form::all;
+use crate::Mode;
+use crate::closed_form::all;
 use handeye_geometry::frames::{Base, Tip};
 
 fn assert_all_find(truth: &Truth, views: &[PosePair]) -> Result<(), TestCaseError> {

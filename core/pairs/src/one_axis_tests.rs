@@ -4,14 +4,10 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::{CalibrateError, CameraKnowledge, Method, Observations, ObservedView, fit};
 use handeye_geometry::frames::{Anchor, Target};
-use handeye_geometry::progress::CancelToken;
 use handeye_geometry::se3;
-use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::noise_twist;
 
-const MODES: [Mode; 2] = [Mode::EyeInHand, Mode::EyeToHand];
 const POSITION_M: f64 = 5e-4;
 const ANGLE_RAD: f64 = 1e-3;
 
@@ -92,41 +88,5 @@ fn a_turn_about_one_line_states_nothing() {
             let session = session(seed, 12, 0.0, noisy);
             assert_eq!(solve(Mode::EyeInHand, &session.pairs, session.axis.into_inner()), None, "{seed} {noisy}");
         }
-    }
-}
-
-#[test]
-fn a_calibration_about_one_axis_is_refused_with_what_it_determines_in_both_modes() {
-    for mode in MODES {
-        let session = session(3, 12, 0.2, false);
-        let views = session.pairs.iter().enumerate().map(|(i, pair)| {
-            let base_from_tip = match mode {
-                Mode::EyeInHand => pair.anchor_from_mount.relabel(),
-                Mode::EyeToHand => pair.anchor_from_mount.inverse().relabel(),
-            };
-            let view = ObservedView::new(format!("{i}"), Some(base_from_tip), None);
-            ObservedView { camera_from_target: Some(pair.camera_from_target), ..view }
-        });
-        let observations = Observations {
-            mode: Some(mode),
-            target: BOARD,
-            image_size: (640, 480),
-            camera: CameraKnowledge::NOTHING,
-            views: views.collect(),
-        };
-        let error = fit(&observations, Method::Joint, &CancelToken::default()).expect_err("one axis");
-        let CalibrateError::OneAxis(found) = &error else { panic!("{error}") };
-        let (place, turn) = errors(found, &session.mount_from_camera);
-        assert!(place.norm() < 1e-7 && turn.norm() < 1e-7, "{place} {turn}");
-        assert_eq!(found.mode, mode);
-        assert!(found.open_axis.dot(&session.axis).abs() > 1.0 - 1e-12);
-        let is_across = |axis: &Unit<Vector3<f64>>| axis.dot(&found.open_axis).abs() < 1e-12;
-        assert!(found.across.iter().all(is_across), "nothing is said along the axis");
-        let text = error.to_string();
-        let mount = if mode == Mode::EyeInHand { "tip" } else { "base" };
-        assert!(
-            text.contains(&format!("of the {mount}: the position of the camera along it is not determined")),
-            "{text}"
-        );
     }
 }

@@ -46,7 +46,7 @@ const SUSPECT: f64 = 0.25;
 const ROUNDS: usize = 8;
 
 /// An estimate from a choice of views.
-pub(crate) trait Estimator {
+pub trait Estimator {
     /// What it finds.
     type Solution;
 
@@ -65,7 +65,7 @@ pub(crate) trait Estimator {
 
 /// How far a view is from what a fit expects of it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Judged {
+pub struct Judged {
     /// `T²`.
     pub squared: f64,
     /// What it stays below in healthy sessions, see [`limit`].
@@ -93,16 +93,19 @@ impl From<&Judged> for Distance {
     }
 }
 
-/// A solution, the views that it is from, ascending, and how far every view is from it.
-pub(crate) struct ScreenedFit<S> {
+/// A solution without the views that do not belong to the others.
+pub struct ScreenedFit<S> {
+    /// What was found.
     pub solution: S,
+    /// The views that it is from, ascending.
     pub kept: Vec<usize>,
+    /// How far every view is from it.
     pub judged: Vec<Judged>,
 }
 
 /// Limit of `T²` that all of `views` healthy views stay below but in [`FALSE_ALARM`] of sessions, where its noise rests on so
 /// many degrees of freedom.
-pub(crate) fn limit(views: usize, freedom: f64) -> f64 {
+pub fn limit(views: usize, freedom: f64) -> f64 {
     let level = 1.0 - FALSE_ALARM / views as f64;
     // Both numbers are positive, so the distribution exists; without it nothing is left out as an outlier.
     FisherSnedecor::new(6.0, freedom).map_or(f64::INFINITY, |f| 6.0 * f.inverse_cdf(level))
@@ -114,7 +117,7 @@ pub(crate) fn limit(views: usize, freedom: f64) -> f64 {
 ///
 /// # Errors
 /// As [`Estimator::fit`] of all views.
-pub(crate) fn screened<E: Estimator>(estimator: &E, misfits: &[f64]) -> Result<ScreenedFit<E::Solution>, HandEyeError> {
+pub fn screened<E: Estimator>(estimator: &E, misfits: &[f64]) -> Result<ScreenedFit<E::Solution>, HandEyeError> {
     let views = misfits.len();
     let all: Vec<usize> = (0..views).collect();
     let fit_all = || fitted(estimator, all.clone(), None);

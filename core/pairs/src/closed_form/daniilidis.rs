@@ -5,7 +5,7 @@ use nalgebra::{DVector, Quaternion, SMatrix, UnitQuaternion, Vector3};
 use super::linear::{RANK_TOLERANCE, Rows};
 use super::pairing::{self, Motion};
 use super::{ClosedForm, ClosedFormSolution, Method, check, with_mean_target};
-use crate::handeye::{HandEyeError, PosePair};
+use crate::{HandEyeError, PosePair};
 use handeye_geometry::se3::skew;
 
 /// Estimates `mount_from_camera` from relative motions, as one unit dual quaternion.
