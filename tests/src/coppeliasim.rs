@@ -41,13 +41,11 @@ const SETTERS: [&str; 5] = ["setJointInterval", "setJointMode", "setObjectInt32P
 pub struct Call {
     /// The function, with its namespace.
     pub function: String,
-    /// With what.
     pub args: Vec<Value>,
     /// What it was given.
     pub returned: Vec<Value>,
 }
 
-/// The stand-in.
 pub struct StandIn {
     /// The cell, for questions.
     pub cell: Connection,

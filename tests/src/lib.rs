@@ -16,7 +16,6 @@ use std::process::{Child, Command, Stdio};
 
 use handeye_cell::scene::Scene;
 
-/// Root of the workspace.
 pub fn workspace_root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or_else(|| Path::new("."))
 }

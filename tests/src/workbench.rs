@@ -67,7 +67,6 @@ impl Workbench {
         self.app.model()
     }
 
-    /// A click.
     pub fn click(&mut self, command: impl Into<Command>) {
         self.app.apply(command);
     }

@@ -20,7 +20,6 @@ impl Failure {
         Self { code: 2, error: error.into() }
     }
 
-    /// The exit code.
     pub(crate) fn exit_code(&self) -> u8 {
         self.code
     }

@@ -56,7 +56,6 @@ struct PlanDocument {
     poses: Vec<PlannedPose>,
 }
 
-/// A pose.
 #[derive(Debug, Serialize)]
 struct PlannedPose {
     base_from_tip: Transform,

@@ -36,7 +36,6 @@ pub enum Item {
     Begin(Recording),
     /// It has another name now.
     Name(String),
-    /// An entry.
     Entry(Entry),
 }
 

@@ -62,7 +62,6 @@ pub enum Next {
     End,
 }
 
-/// The queue.
 #[derive(Debug)]
 pub struct Queue {
     state: Mutex<State>,

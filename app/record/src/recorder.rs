@@ -27,7 +27,6 @@ pub enum WebViewer {
     Relayed(Arc<Relay>),
 }
 
-/// How to record.
 pub struct RecorderOptions {
     /// Where to.
     pub choice: RerunChoice,

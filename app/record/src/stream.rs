@@ -60,12 +60,7 @@ pub enum Target {
         sink: SharedSink,
     },
     /// Viewers: what lasts and what is live may go different ways.
-    Viewers {
-        /// For what lasts.
-        lasting: SharedSink,
-        /// For what is live.
-        live: SharedSink,
-    },
+    Viewers { lasting: SharedSink, live: SharedSink },
 }
 
 /// What is written for one recording.

@@ -27,7 +27,6 @@ const CONNECT: Duration = Duration::from_secs(10);
 /// Between two looks at a connection.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Which viewer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ViewerRequest {
     /// The native one, or the web viewer where there is none.

@@ -39,7 +39,6 @@ pub enum Access {
     Here,
     /// Whoever has the key.
     Key {
-        /// It.
         key: String,
         /// What others took for it.
         guesses: Mutex<Guesses>,

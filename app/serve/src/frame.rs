@@ -10,7 +10,6 @@ use super::textures::Textures;
 pub struct Frame {
     /// Width and height \[points\].
     pub size: [f32; 2],
-    /// Pixels of a point.
     pub pixels_per_point: f32,
     /// Triangles, in the order in which they are drawn.
     pub chunks: Vec<Chunk>,

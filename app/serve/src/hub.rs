@@ -43,7 +43,6 @@ pub struct Hub {
 /// Who is there.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct People {
-    /// The page that drives.
     pub driver: Option<PageId>,
     /// How many pages there are.
     pub pages: usize,
@@ -77,10 +76,7 @@ pub struct Words {
 #[serde(tag = "t", rename_all = "snake_case")]
 pub enum PageRequest {
     /// Text goes to the clipboard.
-    Copy {
-        /// The text.
-        text: String,
-    },
+    Copy { text: String },
     /// An address is opened beside the page.
     Visit {
         /// The address.

@@ -15,22 +15,15 @@ const SIZES: std::ops::RangeInclusive<f32> = 100.0..=8192.0;
 /// Pixels of a point that are drawn for.
 const SCALES: std::ops::RangeInclusive<f32> = 0.5..=4.0;
 
-/// A message of a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "t", rename_all = "snake_case", deny_unknown_fields)]
 pub enum PageMessage {
     /// What a person did, in order.
-    Input {
-        /// The events.
-        events: Vec<Done>,
-    },
+    Input { events: Vec<Done> },
     /// The size of the page.
     Screen(Screen),
     /// A frame is on the screen.
-    Shown {
-        /// Its number.
-        number: u64,
-    },
+    Shown { number: u64 },
     /// Whether the page can be seen.
     Visible {
         /// It can.
@@ -129,25 +122,16 @@ pub enum Done {
         modifiers: u8,
     },
     /// Text was typed.
-    Text {
-        /// The text.
-        text: String,
-    },
+    Text { text: String },
     /// Text is being composed.
     Compose {
         /// As it is so far.
         text: String,
     },
     /// Text was composed.
-    Composed {
-        /// The text.
-        text: String,
-    },
+    Composed { text: String },
     /// Text comes from the clipboard.
-    Paste {
-        /// The text.
-        text: String,
-    },
+    Paste { text: String },
     /// The selection is to be copied.
     Copy,
     /// The selection is to be cut.
@@ -172,7 +156,6 @@ pub enum Done {
 pub enum Phase {
     /// It came down.
     Start,
-    /// It moved.
     Move,
     /// It was lifted.
     End,

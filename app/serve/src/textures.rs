@@ -40,7 +40,6 @@ pub struct Part {
 pub struct Encoded {
     /// Whether it is a JPEG; otherwise deflated RGBA with premultiplied alpha.
     pub jpeg: bool,
-    /// The bytes.
     pub bytes: Arc<[u8]>,
 }
 

@@ -18,13 +18,9 @@ use handeye_workbench::{
 pub enum Group {
     /// The arm and captures.
     Work,
-    /// The session.
     Session,
-    /// The steps.
     Steps,
-    /// The window.
     Window,
-    /// The panes.
     Panes,
 }
 

@@ -33,7 +33,6 @@ fn id() -> Id {
 pub(crate) struct Face {
     /// There is a connection to the arm.
     pub can_act: bool,
-    /// The words.
     pub words: &'static str,
     /// Colour of the button.
     pub fill: Color32,

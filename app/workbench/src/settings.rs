@@ -50,11 +50,9 @@ pub struct Settings {
 /// The language of the window, as it is wished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 enum LanguageChoice {
-    /// That of the system.
     #[default]
     #[serde(rename = "system")]
     System,
-    /// English.
     #[serde(rename = "en")]
     English,
     /// Simplified Chinese.
@@ -159,7 +157,6 @@ impl Settings {
         if self.connect.is_empty() { self.built_in() } else { CellSource::Address(self.connect.clone()) }
     }
 
-    /// The built-in cell.
     pub fn built_in(&self) -> CellSource {
         CellSource::BuiltIn(self.scene.clone().into())
     }

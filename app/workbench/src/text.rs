@@ -14,7 +14,6 @@ pub use handeye_wording::{Catalogue, Text};
 /// Languages of the window.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Language {
-    /// English.
     #[default]
     #[serde(rename = "en")]
     English,

@@ -47,7 +47,7 @@ pub enum ArmError {
         joint: usize,
         /// Which number.
         name: &'static str,
-        /// What it is.
+        /// The number as it was given: metres or radians.
         value: f64,
     },
     /// A joint that no arm has.

@@ -40,6 +40,8 @@
 //!
 //! Depends on `handeye_geometry`; never on an estimator.
 
+#![warn(missing_docs)]
+
 mod built_in;
 mod dh;
 mod error;

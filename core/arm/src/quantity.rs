@@ -31,7 +31,7 @@ impl JointKind {
 /// format does not say how many.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointQuantity {
-    /// Of what joint.
+    /// Whether it turns or slides.
     pub kind: JointKind,
     /// Radians, or metres of a prismatic joint.
     pub value: f64,

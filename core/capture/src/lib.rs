@@ -25,6 +25,8 @@
 //!
 //! Never depends on a detector or an estimator.
 
+#![warn(missing_docs)]
+
 mod average;
 mod cells;
 mod machine;

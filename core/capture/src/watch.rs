@@ -44,7 +44,7 @@ const NO_DIFFERENCE: f64 = 0.005;
 pub enum Rest {
     /// Too few images to tell, and nothing moved in those.
     Unknown,
-    /// The robot moves.
+    /// The robot has not come to rest, and how fast it moves.
     RobotMoves(RobotRate),
     /// The robot is at rest, the image is not yet.
     ImageChanges,

@@ -80,7 +80,7 @@ pub enum DatasetProblem {
     MissingKey {
         /// The table it belongs to.
         table: &'static str,
-        /// The key.
+        /// The key in `dataset.toml`.
         key: &'static str,
         /// Why it is needed.
         why: &'static str,
@@ -88,7 +88,7 @@ pub enum DatasetProblem {
     /// A value out of range.
     #[error("{key} = {value} is not usable: it must be {want}")]
     BadValue {
-        /// The key.
+        /// The key in `dataset.toml`.
         key: &'static str,
         /// What it says.
         value: String,
@@ -115,7 +115,7 @@ pub enum DatasetProblem {
     /// A key of another kind of target.
     #[error("{key} does not belong to a target of kind {kind:?}: remove it, or check the kind")]
     ForeignKey {
-        /// The key.
+        /// The key in `dataset.toml`.
         key: &'static str,
         /// The kind that is stated.
         kind: &'static str,
@@ -166,7 +166,7 @@ pub enum DatasetProblem {
     /// Text where a number belongs.
     #[error("{column} = {cell:?} is not a number")]
     NotANumber {
-        /// The column.
+        /// Header of the column.
         column: &'static str,
         /// What the cell says, shortened.
         cell: String,
@@ -174,7 +174,7 @@ pub enum DatasetProblem {
     /// NaN or infinite.
     #[error("{column} = {cell:?} is not finite: leave out views without a pose")]
     NotFinite {
-        /// The column.
+        /// Header of the column.
         column: &'static str,
         /// What the cell says, shortened.
         cell: String,
@@ -182,7 +182,7 @@ pub enum DatasetProblem {
     /// A quaternion that is none.
     #[error("the quaternion has length {length:.6}, which is more than {tolerance} from 1: check the columns")]
     NotUnit {
-        /// Its length.
+        /// Length of the quaternion as it was read.
         length: f64,
         /// How far from 1 it may be.
         tolerance: f64,
@@ -193,7 +193,7 @@ pub enum DatasetProblem {
     /// An angle that nobody writes in radians, or a typing error.
     #[error("{column} = {value} {unit} is more than two turns: check {key}")]
     AngleTooLarge {
-        /// The column.
+        /// Header of the column.
         column: &'static str,
         /// The value as written.
         value: f64,

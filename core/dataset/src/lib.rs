@@ -31,6 +31,8 @@
 //!
 //! `examples/calibrate_folder.rs` calibrates one. Never depends on a detector, a PDF writer or formats of other tools.
 
+#![warn(missing_docs)]
+
 mod config;
 mod corners;
 pub mod correct_table;
@@ -86,7 +88,7 @@ use text::TextFile;
 /// A dataset folder, read and checked. The images are not in memory: see [`Dataset::load_rgb`].
 #[derive(Debug, Clone)]
 pub struct Dataset {
-    /// The folder.
+    /// The folder that was read.
     pub folder: PathBuf,
     /// Where the camera sits; `None` when there is no robot, so that only intrinsics can be estimated.
     pub mode: Option<Mode>,

@@ -179,7 +179,7 @@ pub struct MotionLimits {
 #[error("{place}: {problem}", place = place(file, *row, pose.as_deref()))]
 #[non_exhaustive]
 pub struct PosesError {
-    /// The file.
+    /// The file of poses.
     pub file: PathBuf,
     /// Line as an editor counts it, from 1.
     pub row: Option<usize>,

@@ -64,7 +64,7 @@ pub enum TypedPoseError {
     /// A word that is no number.
     #[error("{word:?} is not a number")]
     NoNumber {
-        /// The word.
+        /// What was typed.
         word: String,
     },
     /// Too few or too many.
@@ -90,7 +90,7 @@ pub enum TypedPoseError {
     /// A quaternion of another length.
     #[error("the quaternion has the length {length:.4} instead of 1: check the order of the numbers")]
     NotUnit {
-        /// Its length.
+        /// Length of the quaternion as it was typed.
         length: f64,
     },
     /// No rotation matrix.

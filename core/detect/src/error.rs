@@ -31,7 +31,7 @@ pub enum VisionError {
     OtherLayout {
         /// What is reported.
         stated: &'static str,
-        /// What is seen.
+        /// The layout of the board in the image.
         seen: &'static str,
     },
     /// The image has no pixels, or more than OpenCV can address.

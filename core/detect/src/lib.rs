@@ -21,6 +21,8 @@
 //! OpenCV's own errors never leave this crate as types: [`VisionError::OpenCv`] carries the operation and the text. Never depends
 //! on an estimator.
 
+#![warn(missing_docs)]
+
 mod bridge;
 pub mod checkerboard;
 mod circles;

@@ -23,7 +23,7 @@ use handeye_geometry::view_equations::DepthBias;
 /// to be used with corrected poses alone: those of the controller go with those of [`Fit::hand_eye`](crate::Fit::hand_eye).
 #[derive(Debug, Clone)]
 pub struct ArmFit {
-    /// The errors.
+    /// The errors of the joints and links, with covariance and levels.
     pub errors: ArmErrors,
     /// Both rigid links, by corrected tip poses.
     pub hand_eye: HandEye,

@@ -80,6 +80,8 @@
 //! Conventions are in `docs/reference/conventions.md`, the mathematics in `docs/maths`. Results are the same in every run and on any number of
 //! cores: no clock, no hidden seed. Never depends on images, files, OpenCV, windows or sockets.
 
+#![warn(missing_docs)]
+
 mod arm_fit;
 mod bend;
 mod corners;
@@ -219,7 +221,7 @@ pub struct JointDepths {
 /// The shape of the target where it is not the one drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeEstimate {
-    /// The shape.
+    /// Scale and bend of the target.
     pub shape: BoardShape,
     /// Standard deviations of the two warps, metres; `None` when the target is taken as flat.
     pub warp_sigma_m: Option<[f64; 2]>,
@@ -234,7 +236,7 @@ pub struct TargetSize {
     pub scale: f64,
     /// Its standard deviation.
     pub sigma: f64,
-    /// Degrees of freedom of that.
+    /// Degrees of freedom that the standard deviation rests on.
     pub degrees_of_freedom: f64,
     /// The hand-eye transform with a target of that size, by what is known of sizes beforehand.
     pub with: Alternative,
@@ -418,7 +420,7 @@ pub struct CameraFit {
     /// By how much standard deviations are larger than those of corners that err independently, because the views scatter
     /// more; smaller than 1 where they happen to scatter less.
     pub times: f64,
-    /// Degrees of freedom of that.
+    /// Degrees of freedom that the standard deviation rests on.
     pub degrees_of_freedom: f64,
     /// The target where the corners show that it is bent.
     pub shape: Option<ShapeEstimate>,
@@ -522,7 +524,7 @@ impl JointFit {
 /// What one closed form said.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodResult {
-    /// Its name.
+    /// Its name on the command line.
     pub name: &'static str,
     /// Its answer, or why it has none.
     pub outcome: Result<ClosedFormSolution, HandEyeError>,
@@ -531,7 +533,7 @@ pub struct MethodResult {
 /// What became of one view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewResult {
-    /// Its name.
+    /// Its name in the observations.
     pub name: String,
     /// How it was used.
     pub status: ViewStatus,

@@ -51,7 +51,6 @@ const LEVEL: f64 = 0.95;
 const STEP: f64 = 1e-6;
 /// Of the draws: the same in every run.
 pub(crate) const SEED: u64 = 0x72_6561_6368;
-/// Of the touches.
 const TOUCH_SEED: u64 = 0x74_6f75_6368;
 
 /// Length of a tool that nobody has named, metres.
@@ -121,7 +120,6 @@ struct Touch {
     /// Joint values of the view and of the command.
     view: At,
     command: At,
-    /// The point in the camera.
     in_camera: Point3<f64>,
     /// Turn of the tip in the base as the way takes it to be.
     turn: UnitQuaternion<f64>,

@@ -20,7 +20,6 @@ pub(super) struct ArmUrdf;
 /// Stands for a limit that is not known: URDF wants a number, and takes 0 for an arm that cannot move.
 const UNKNOWN: f64 = 1e6;
 
-/// A joint of the file.
 struct FileJoint<'a> {
     name: String,
     parent: &'a str,

@@ -11,7 +11,7 @@ pub enum ExportError {
     /// No format of that name.
     #[error("unknown export format {name:?}: choose from {known}")]
     UnknownFormat {
-        /// The name.
+        /// The name that was asked for.
         name: String,
         /// The names there are.
         known: String,
@@ -22,7 +22,7 @@ pub enum ExportError {
          format of the camera alone, or calibrate with robot poses"
     )]
     NeedsHandEye {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// A result without the place of the target, for a format that has it.
@@ -31,7 +31,7 @@ pub enum ExportError {
          the hand-eye alone, or calibrate again"
     )]
     NeedsTarget {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// A result of pose pairs, for a format with a camera.
@@ -40,7 +40,7 @@ pub enum ExportError {
          format of the hand-eye alone, or calibrate from images"
     )]
     NeedsIntrinsics {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// A lens model that the format cannot hold. Nothing is truncated: the pixels would no longer be those of the lens.
@@ -49,7 +49,7 @@ pub enum ExportError {
          every model, or calibrate with {instead} under [camera] in dataset.toml"
     )]
     NeedsModel {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
         /// The lens model of the result.
         model: &'static str,
@@ -64,7 +64,7 @@ pub enum ExportError {
          or a cell that says which it is) and joint values in every row, or export urdf or another format of the hand-eye"
     )]
     NeedsArm {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// An arm that views left out speak against.
@@ -73,7 +73,7 @@ pub enum ExportError {
          controller counts: capture more views and calibrate again, or export urdf or another format of the hand-eye"
     )]
     ArmContradicted {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// An arm that the format cannot hold.
@@ -81,7 +81,7 @@ pub enum ExportError {
         "{format} cannot hold this arm: {problem}. Export arm_urdf or dh_table, which hold every arm of revolute joints"
     )]
     OtherArm {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
         /// What about it.
         problem: &'static str,
@@ -92,7 +92,7 @@ pub enum ExportError {
          dataset folder itself, with its dataset.toml and pose table"
     )]
     NeedsViews {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// A camera that does not move, for a format about the camera's pose in every image.
@@ -101,13 +101,13 @@ pub enum ExportError {
          still, and all images would have one pose. Export ros_tf or another format of a single transform"
     )]
     NeedsMovingCamera {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
     },
     /// A view that the format cannot hold.
     #[error("{format} cannot hold the view {name:?}: {problem}")]
     BadView {
-        /// The format.
+        /// The export format, as the command line names it.
         format: &'static str,
         /// The view.
         name: String,
@@ -119,7 +119,7 @@ pub enum ExportError {
     BadName {
         /// Which name.
         what: &'static str,
-        /// What it is.
+        /// The name that was asked for.
         name: String,
     },
     /// Two frames with one name.
@@ -157,7 +157,7 @@ pub enum ExportError {
     /// The file does not say what the result says: a defect of this program.
     #[error("{file}: reads back differently: {difference}; please report this", file = file.display())]
     ReadBack {
-        /// The file.
+        /// The file that was written.
         file: PathBuf,
         /// What differs.
         difference: String,

@@ -8,10 +8,10 @@ use handeye_geometry::camera::Intrinsics;
 use handeye_geometry::frames::{Base, Camera, Mount, Pose, Tip};
 use handeye_result::{CalibrationResult, IntrinsicsEstimate};
 
-/// What is exported.
+/// A result, and what else a format may need of its session.
 #[derive(Debug, Clone, Copy)]
 pub struct ExportInput<'a> {
-    /// The calibration.
+    /// The result that is exported.
     pub result: &'a CalibrationResult,
     /// Names that it does not know.
     pub names: &'a ExportNames,

@@ -18,6 +18,8 @@
 //! A new format is one file here, one entry in [`formats`] and one row of the documentation. Never depends on images, sessions or
 //! data sets.
 
+#![warn(missing_docs)]
+
 mod arm_urdf;
 mod colmap;
 mod corrected;

@@ -16,7 +16,7 @@ const UNIT_TOLERANCE: f64 = 1e-5;
 pub struct ExportNames {
     /// Name of the calibration where a format has one; also the name of its file.
     pub calibration: String,
-    /// Name of the camera.
+    /// Name of the camera where a format has one, for example in `camera_info`.
     pub camera_name: String,
     /// The robot's base.
     pub base_frame: String,

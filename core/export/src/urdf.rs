@@ -14,7 +14,6 @@ use handeye_wording::Text;
 
 pub(super) struct Urdf;
 
-/// Name of the joint.
 pub(super) fn joint_name(transform: &NamedTransform<'_>) -> String {
     format!("{}_to_{}", transform.parent, transform.child)
 }

@@ -12,6 +12,8 @@
 //!
 //! Never depends on what is in the files.
 
+#![warn(missing_docs)]
+
 #[cfg(feature = "atomic_file")]
 pub mod atomic_file;
 pub mod bounds;

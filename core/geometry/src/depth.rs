@@ -39,7 +39,7 @@ pub enum DepthError {
     /// The range to colour, or the scale of the encoding, is empty or not a number.
     #[error("{what} from {low} to {high} is not usable: both must be finite and the second larger")]
     BadRange {
-        /// What it is for.
+        /// What has the range.
         what: &'static str,
         /// Lower end.
         low: f64,

@@ -28,6 +28,8 @@
 //! Frames, units, the origin of pixels and the order of tangent vectors: `docs/reference/conventions.md`. Never depends on images, files,
 //! OpenCV, threads or clocks.
 
+#![warn(missing_docs)]
+
 pub mod camera;
 pub mod depth;
 pub mod frames;

@@ -36,7 +36,7 @@ impl Mode {
 pub struct Observations {
     /// Where the camera sits; `None` when there is no robot and only the camera is calibrated.
     pub mode: Option<Mode>,
-    /// The target.
+    /// The target that is seen in all views.
     pub target: TargetSpec,
     /// Width and height of the images in pixels.
     pub image_size: (u32, u32),

@@ -13,6 +13,8 @@
 //!
 //! Pixels need the crate `image`, behind the feature `pixels`; the size of an image does not. Never depends on a detector.
 
+#![warn(missing_docs)]
+
 mod header;
 #[cfg(feature = "pixels")]
 mod pixels;

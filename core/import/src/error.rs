@@ -48,7 +48,7 @@ pub enum ImportError {
         formats = with_poses()
     )]
     NoPoses {
-        /// The folder.
+        /// The folder that was read.
         folder: PathBuf,
         /// How many poses a calibration needs.
         need: usize,
@@ -63,7 +63,7 @@ pub enum ImportError {
         alike = alike(*spread_mm_deg)
     )]
     DidNotMove {
-        /// The folder.
+        /// The folder that was read.
         folder: PathBuf,
         /// The robot's poses.
         series: String,
@@ -79,7 +79,7 @@ pub enum ImportError {
         folder = folder.display()
     )]
     NoViews {
-        /// The folder.
+        /// The folder that was read.
         folder: PathBuf,
         /// How many views a solution needs.
         need: usize,
@@ -105,7 +105,7 @@ pub enum ImportError {
     /// A choice that is none.
     #[error("{key} = {value:?} is not a choice here: {choices}")]
     BadChoice {
-        /// The key.
+        /// The convention that was set.
         key: String,
         /// What was given.
         value: String,
@@ -121,7 +121,7 @@ pub enum ImportError {
     /// It could not be written.
     #[error("{file}: cannot be written: {why}", file = file.display())]
     Unwritable {
-        /// The file.
+        /// The file that could not be written.
         file: PathBuf,
         /// What the system says.
         why: String,

@@ -153,7 +153,7 @@ pub struct Convention {
     pub key: &'static str,
     /// Its value there.
     pub value: String,
-    /// What it means.
+    /// What it means, in words.
     pub means: String,
 }
 

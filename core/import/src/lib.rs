@@ -18,6 +18,8 @@
 //!
 //! SQLite, MCAP, Zstandard and bzip2 are linked here alone. Never depends on a detector: the caller finds the target.
 
+#![warn(missing_docs)]
+
 mod camera;
 mod chain;
 mod conventions;

@@ -120,7 +120,7 @@ impl Stream {
     }
 }
 
-/// An image.
+/// An image of a recording, as a file or out of a bag.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageFile {
     /// Where it is, below the folder of the recording; of one that was unpacked as a whole.
@@ -201,7 +201,7 @@ pub struct Sample {
     pub number: Option<u64>,
     /// Where it stands, for messages: file and row. A row that may be read in several ways has one for all of them.
     pub place: Arc<Text>,
-    /// The numbers.
+    /// The numbers of the pose as they are written down.
     pub numbers: Numbers,
     /// Joint values that stand with it, in the unit of the file.
     pub joints: Vec<f64>,
@@ -249,7 +249,7 @@ pub struct Motion {
 /// How far the clock of a camera and that of a robot are apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clocks {
-    /// The images.
+    /// Name of the series of images.
     pub images: String,
     /// The robot's poses.
     pub poses: String,
@@ -285,16 +285,16 @@ pub struct JointSample {
     pub number: Option<u64>,
     /// Where they stand, for messages.
     pub place: Arc<Text>,
-    /// The values.
+    /// The joint values of a row, in the unit of the file.
     pub values: Vec<f64>,
 }
 
 /// What a file says of the conventions of a series, and how it is known. `None`: not stated.
 #[derive(Debug, Clone, Default)]
 pub struct Stated {
-    /// Of lengths.
+    /// The unit of positions.
     pub length: Option<Known<LengthUnit>>,
-    /// Of angles.
+    /// The unit of angles.
     pub angle: Option<Known<AngleUnit>>,
     /// Of rotations: the ones that are left open by what is known.
     pub rotation: Option<Known<Vec<RotationForm>>>,
@@ -323,11 +323,11 @@ impl<T> Known<T> {
 /// Where the camera sits, as a file says it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FoundMode {
-    /// It.
+    /// Eye in hand or eye to hand.
     pub value: Mode,
     /// By what the file says it.
     pub key: &'static str,
-    /// The file.
+    /// The file that says so.
     pub file: String,
 }
 
@@ -341,9 +341,9 @@ impl FoundMode {
 /// A target that a file describes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundTarget {
-    /// It.
+    /// The target with its sizes in metres.
     pub target: TargetSpec,
-    /// The file.
+    /// The file that says so.
     pub file: String,
     /// It is a tag and the file does not say which of its family: the images have to.
     pub is_id_open: bool,

@@ -54,7 +54,7 @@ pub struct Plan {
 
 /// What goes into a plan beside the hypothesis.
 pub struct Context<'a> {
-    /// The recording.
+    /// The recording that is written as a data set.
     pub recording: &'a Recording,
     /// All that was tried.
     pub judgement: &'a Judgement,

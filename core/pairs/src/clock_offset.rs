@@ -40,7 +40,7 @@ pub enum ClockOffsetError {
     /// Too short.
     #[error("{got} poses of the {whose} are too few to tell the offset of its clock, at least {need} are needed", whose = named(whose))]
     TooFew {
-        /// Of what.
+        /// Whose poses: of the robot, or of the camera.
         whose: &'static str,
         /// How many there are.
         got: usize,
@@ -53,7 +53,7 @@ pub enum ClockOffsetError {
         whose = named(whose)
     )]
     NotRising {
-        /// Of what.
+        /// Whose poses: of the robot, or of the camera.
         whose: &'static str,
         /// Where.
         entry: usize,

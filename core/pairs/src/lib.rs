@@ -59,6 +59,8 @@
 //!
 //! Never depends on images, files, OpenCV, windows or sockets.
 
+#![warn(missing_docs)]
+
 pub mod clock_offset;
 pub mod closed_form;
 pub mod consensus;
@@ -218,7 +220,7 @@ pub enum HandEyeError {
     /// The linear algebra found no solution although the views look sufficient.
     #[error("{method} found no solution for these {views} views: {reason}")]
     NoSolution {
-        /// Which method.
+        /// Name of the closed form, or of the pose graph.
         method: &'static str,
         /// With how many views.
         views: usize,

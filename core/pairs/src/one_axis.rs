@@ -43,7 +43,7 @@ const ONE_LINE_M: f64 = 5e-3;
 pub struct PartialHandEye {
     /// Where the camera sits.
     pub mode: Mode,
-    /// Views.
+    /// Number of views that it rests on.
     pub views: usize,
     /// Orientation of the camera in the mount (tip for an eye in hand, base for an eye to hand).
     pub rotation: UnitQuaternion<f64>,

@@ -14,7 +14,6 @@ const UPPER_ARM_BESIDE_M: f64 = 0.136;
 const FOREARM_BESIDE_M: f64 = 0.016;
 /// Gap that the arm keeps from itself.
 pub(super) const SELF_CLEARANCE_M: f64 = 0.01;
-/// Radius of the tool.
 const TOOL_RADIUS_M: f64 = 0.03;
 /// A bound of how far the body of a link is from its axes, metres.
 const BESIDE_AXES_M: f64 = 0.22;

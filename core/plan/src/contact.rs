@@ -25,7 +25,7 @@ pub enum Contact {
     /// Something that stands around.
     #[error("the arm, or what it carries, would come too near to {name:?}: go another way")]
     Box {
-        /// Its name.
+        /// Its name, as the file of the surroundings has it.
         name: String,
     },
     /// The arm itself, or what hangs on its tip.
@@ -94,7 +94,6 @@ impl<'a> Guard<'a> {
         Self { arm, around, allowed: Allowed::all(around, clearance_m) }
     }
 
-    /// The arm.
     pub(super) fn arm(&self) -> &'a Arm {
         self.arm
     }

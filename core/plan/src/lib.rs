@@ -16,6 +16,8 @@
 //! [`guided`] chooses poses one by one until the stated error is reached, [`views_of_board`] a set of them at once, [`travel`] says
 //! whether a way is free. Nothing here moves an arm. Never depends on images, files or sockets.
 
+#![warn(missing_docs)]
+
 mod capsule;
 mod carried;
 mod clearance;

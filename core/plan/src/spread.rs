@@ -22,7 +22,7 @@ const DIRECTIONS: u32 = 8;
 pub struct ViewSetup {
     /// Where the target is.
     pub base_from_target: Pose<Base, Target>,
-    /// What it is.
+    /// The target that is to be seen.
     pub target: TargetSpec,
     /// The lens.
     pub intrinsics: Intrinsics,

@@ -27,9 +27,9 @@ pub enum Shape {
     },
     /// A round dot.
     Dot {
-        /// Its centre.
+        /// Its centre on the sheet, metres.
         centre: Vector2<f64>,
-        /// Its radius.
+        /// Its radius, metres.
         radius: f64,
     },
 }

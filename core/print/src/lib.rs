@@ -15,6 +15,8 @@
 //!
 //! The only crate that writes PDF. The codes of markers come from `handeye_detect`.
 
+#![warn(missing_docs)]
+
 mod drawing;
 mod pdf;
 mod sheet;
@@ -50,7 +52,7 @@ pub enum PrintError {
     DoesNotFit {
         /// Width and height needed, rounded up.
         need_mm: [f64; 2],
-        /// The page.
+        /// The paper that it does not fit on.
         page: Page,
         /// Its width and height, the way round that is nearer to fitting.
         has_mm: [f64; 2],

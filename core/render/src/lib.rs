@@ -23,6 +23,8 @@
 //!
 //! Never depends on arms, protocols, files or clocks.
 
+#![warn(missing_docs)]
+
 mod board;
 mod ground;
 mod imaging;
@@ -132,7 +134,7 @@ impl Solid {
 pub enum Shape {
     /// A ball around the origin.
     Sphere {
-        /// Its radius.
+        /// Its radius, metres.
         radius: f64,
     },
     /// All points within `radius` of the segment from `a` to `b`.

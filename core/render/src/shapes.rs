@@ -129,7 +129,6 @@ impl Facet {
         })
     }
 
-    /// A rectangle.
     pub fn rectangle(middle: &Vector3<f64>, half_u: &Vector3<f64>, half_v: &Vector3<f64>) -> Option<Self> {
         Self::new(middle, half_u, half_v, Outline::Rectangle)
     }
@@ -171,7 +170,6 @@ impl Facet {
     }
 }
 
-/// A ball.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ball {
     centre: Vec3,

@@ -14,7 +14,7 @@ use handeye_wording::one_line;
 #[error("{file}: {problem}", file = file.display())]
 #[non_exhaustive]
 pub struct ResultError {
-    /// The file.
+    /// The file that was read or written.
     pub file: PathBuf,
     /// What is wrong.
     pub problem: ResultProblem,

@@ -15,6 +15,8 @@
 //!
 //! Never depends on images or data sets.
 
+#![warn(missing_docs)]
+
 mod arm;
 mod check;
 mod estimate;
@@ -148,7 +150,7 @@ impl TransformEstimate {
         fits.then(|| Pose::from_translation_xyzw(self.translation_m, self.rotation_xyzw))
     }
 
-    /// The covariance as a matrix.
+    /// [`TransformEstimate::covariance`] as a matrix.
     pub fn covariance_matrix(&self) -> Option<Matrix6<f64>> {
         self.covariance.map(|rows| Matrix6::from_fn(|i, j| rows[i][j]))
     }
@@ -183,13 +185,13 @@ pub struct IntrinsicsEstimate {
 /// Standard deviations of the pinhole parameters in pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct IntrinsicsSigma {
-    /// Of fx.
+    /// Of `fx`.
     pub fx: Option<f64>,
-    /// Of fy.
+    /// Of `fy`.
     pub fy: Option<f64>,
-    /// Of cx.
+    /// Of `cx`.
     pub cx: Option<f64>,
-    /// Of cy.
+    /// Of `cy`.
     pub cy: Option<f64>,
 }
 

@@ -25,7 +25,6 @@ pub const GOLDEN_TRANSLATION_M: [f64; 3] = [0.045, -0.032, 0.061];
 /// Its rotation.
 pub const GOLDEN_XYZW: [f64; 4] = [0.195832126, 0.036412615, 0.644503346, 0.738200065];
 
-/// The camera on the tip.
 pub(crate) fn golden_pose() -> Pose<Tip, Camera> {
     Pose::from_translation_xyzw(GOLDEN_TRANSLATION_M, GOLDEN_XYZW)
 }

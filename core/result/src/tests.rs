@@ -3,7 +3,6 @@ use serde_json::{Value, json};
 use super::testing::*;
 use super::*;
 
-/// A result of every kind.
 fn of_every_kind() -> Vec<CalibrationResult> {
     vec![golden(), eye_to_hand(), intrinsics_only(), pose_pairs_only(), CalibrationResult::default()]
 }

@@ -24,7 +24,7 @@ pub(super) const DEPTH: &str = "depth";
 /// What one capture consists of.
 #[derive(Debug, Clone, Copy)]
 pub struct Capture<'a> {
-    /// The image.
+    /// The colour image.
     pub image: &'a RgbImage,
     /// Depth in metres, of the size of the image.
     pub depth_m: Option<&'a DepthImage>,
@@ -34,7 +34,7 @@ pub struct Capture<'a> {
     pub joints_rad: Option<&'a [f64]>,
     /// Simulation time of the image, seconds.
     pub sim_time_s: Option<f64>,
-    /// What it is for.
+    /// Whether it is for the calibration or for verification.
     pub role: Role,
     /// How many frames the image is the mean of, at least 1.
     pub frames: u32,

@@ -126,7 +126,7 @@ pub struct CaptureRecord {
     pub joints_rad: Option<Vec<f64>>,
     /// Simulation time of the image, seconds.
     pub sim_time_s: Option<f64>,
-    /// What it is for.
+    /// Whether it is for the calibration or for verification.
     #[serde(default)]
     pub role: Role,
     /// Whether a person took it out.

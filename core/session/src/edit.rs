@@ -22,14 +22,14 @@ pub enum Edit {
     DeleteCaptures(Vec<CaptureId>),
     /// Captures are taken out of the fit, or back in.
     SetExcluded {
-        /// Which captures.
+        /// The captures that are changed.
         ids: Vec<CaptureId>,
         /// Out of the fit.
         excluded: bool,
     },
     /// Captures are for something else.
     SetRole {
-        /// Which captures.
+        /// The captures that are changed.
         ids: Vec<CaptureId>,
         /// What they are for.
         role: Role,

@@ -46,6 +46,8 @@
 //!
 //! Never depends on a detector or a window.
 
+#![warn(missing_docs)]
+
 mod arm_use;
 mod capture;
 mod capture_id;
@@ -93,7 +95,7 @@ pub const RESULT: &str = "result.json";
 /// A session that was read, without the right to change it.
 #[derive(Debug, Clone)]
 pub struct Session {
-    /// The folder.
+    /// The folder that was read.
     pub folder: PathBuf,
     /// The session as it was when it was read.
     pub document: Arc<Document>,

@@ -99,7 +99,7 @@ impl Store {
         Ok(self)
     }
 
-    /// The folder.
+    /// The folder of the session.
     pub fn folder(&self) -> &Path {
         &self.folder
     }

@@ -17,11 +17,9 @@ use handeye_geometry::testing::looking_at;
 /// A camera that looks at a board from all sides, without a robot.
 #[derive(Debug, Clone, Copy)]
 pub struct BoardViews {
-    /// The camera.
     pub camera: Intrinsics,
     /// The board as drawn.
     pub grid: Grid,
-    /// And as it is.
     pub shape: BoardShape,
     /// Least and most tilt, radians.
     pub tilt: (f64, f64),

@@ -12,9 +12,7 @@ use handeye_geometry::observations::{Mode, Noise};
 pub struct Links {
     /// Who carries the camera.
     pub mode: Mode,
-    /// The camera on its mount.
     pub mount_from_camera: Pose<Mount, Camera>,
-    /// The target on its anchor.
     pub anchor_from_target: Pose<Anchor, Target>,
 }
 

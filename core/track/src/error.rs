@@ -35,7 +35,7 @@ pub enum TrackError {
     BadMotion {
         /// Which one.
         name: &'static str,
-        /// Its value.
+        /// The number that was given.
         value: f64,
     },
     /// The time of an image is not a number.

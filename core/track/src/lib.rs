@@ -30,6 +30,8 @@
 //!
 //! Depends on `handeye_detect` and `handeye_estimate`; never on a window or a socket.
 
+#![warn(missing_docs)]
+
 mod by_depth;
 mod corner;
 mod depth_tilt;
@@ -87,7 +89,7 @@ pub struct MotionModel {
 pub struct Image<'a> {
     /// Its time \[s\]; must grow from image to image, a step back starts the tracker again.
     pub time_s: f64,
-    /// The image.
+    /// The image in grey levels.
     pub grey: &'a GrayImage,
     /// Depth of the same instant and the same camera, where there is one.
     pub depth: Option<&'a DepthImage>,

@@ -19,6 +19,8 @@
 //!
 //! Depends on `serde` and its own derive macro alone.
 
+#![warn(missing_docs)]
+
 use std::borrow::Cow;
 use std::fmt;
 

@@ -33,7 +33,7 @@ pub enum LinkError {
          the ZMQ remote API add-on is enabled and which port its status bar shows (usually 23000)"
     )]
     Unreachable {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// Where to.
         endpoint: Endpoint,
@@ -46,7 +46,7 @@ pub enum LinkError {
          again"
     )]
     Timeout {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// How long was waited.
         after: Duration,
@@ -63,13 +63,13 @@ pub enum LinkError {
     /// The connection was lost while the call was under way; whether it had an effect is not known.
     #[error("{call}: the server went away during the call; start it again if it has stopped, then connect again")]
     Disconnected {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
     },
     /// The cell in this process did not answer in time.
     #[error("{call}: the built-in cell has not answered for {after:.1?}: this computer has too much to do; try again")]
     OwnCellSilent {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// How long was waited.
         after: Duration,
@@ -79,19 +79,19 @@ pub enum LinkError {
         "{call}: the built-in cell has ended by a defect of this program: report it, with the lines above, and try again"
     )]
     OwnCellEnded {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
     },
     /// The caller cancelled.
     #[error("{call}: cancelled")]
     Cancelled {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
     },
     /// The server answered with an error.
     #[error("{call} failed in the simulator: {reported}", reported = without_place(message))]
     Remote {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// The server's text, verbatim.
         message: String,
@@ -99,7 +99,7 @@ pub enum LinkError {
     /// The reply is not a message.
     #[error("{call}: the reply cannot be read: {source}; {advice}", advice = advice_on_bytes(*has_spoken))]
     Malformed {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// What is wrong with it.
         source: WireError,
@@ -114,7 +114,7 @@ pub enum LinkError {
         limit = MAX_MESSAGE_BYTES >> 20
     )]
     ReplyTooLarge {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// Its length; `None` when it was so long that it was not read to its end.
         bytes: Option<usize>,
@@ -122,7 +122,7 @@ pub enum LinkError {
     /// The reply is a message, but not one that the call can have.
     #[error("{call}: expected {expected}, got {got}; check that the simulator is CoppeliaSim 4.7 or newer")]
     UnexpectedReply {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// What was expected.
         expected: String,
@@ -132,7 +132,7 @@ pub enum LinkError {
     /// The reply has the right shape but a value that means nothing.
     #[error("{call}: {source}; check the object in the scene")]
     BadValue {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// What is wrong with it.
         source: ConvertError,
@@ -146,7 +146,7 @@ pub enum LinkError {
     /// The server lacks the call.
     #[error("{call} is not available on this server: it needs {needs}")]
     Unsupported {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// What has it.
         needs: &'static str,
@@ -161,7 +161,7 @@ pub enum LinkError {
     NoSuchObject {
         /// The path asked for.
         path: String,
-        /// What it is for.
+        /// What of the cell was looked for at that path.
         part: CellPart,
         /// Paths of objects of that kind that the scene has.
         there: Vec<String>,
@@ -233,7 +233,7 @@ pub enum LinkError {
         what: &'static str,
         /// What it must be.
         expected: &'static str,
-        /// What it is.
+        /// The number that was given.
         value: f64,
     },
     /// The simulator gave the motion up.
@@ -241,7 +241,7 @@ pub enum LinkError {
         "{call}: the simulator stopped the motion with code {code}; check the limits of velocity, acceleration, jerk"
     )]
     MotionFailed {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
         /// Result of the motion generator.
         code: i64,
@@ -252,7 +252,7 @@ pub enum LinkError {
          because its computer slept; an arm that it was moving stands where it was: move again"
     )]
     Forgotten {
-        /// Which call.
+        /// The call of the remote API, for example `sim.getObject`.
         call: String,
     },
     /// Somebody else stopped the motion, and the arm stands.
@@ -277,7 +277,7 @@ pub enum LinkError {
     /// The arm would come nearer to something on its way than it may; nothing was moved.
     #[error("nothing was moved: {contact}")]
     InTheWay {
-        /// To what.
+        /// What would be touched.
         contact: handeye_plan::Contact,
     },
     /// No motion fits the limits.

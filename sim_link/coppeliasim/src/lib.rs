@@ -19,6 +19,8 @@
 //!
 //! Never depends on the simulated cell or its server.
 
+#![warn(missing_docs)]
+
 pub mod cell;
 mod connection;
 pub mod constants;

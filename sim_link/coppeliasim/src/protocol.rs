@@ -34,7 +34,6 @@ pub(super) struct Sender<'a> {
     pub introduces: Option<&'static str>,
 }
 
-/// A request.
 pub(super) fn request(func: &str, args: Vec<Value>, sender: &Sender<'_>) -> Vec<u8> {
     let count = args.len() as u64;
     let mut entries = vec![

@@ -16,7 +16,7 @@ use super::options::DriverOptions;
 use super::spec::DriverSpec;
 use super::states::{NoPose, RobotAt};
 
-/// Which drivers.
+/// The drivers of a cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DriverCellSpec {
     /// The robot's, or that of robot and camera, or of a camera alone.

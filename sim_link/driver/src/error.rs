@@ -16,7 +16,7 @@ pub enum DriverError {
     /// The program cannot be started.
     #[error("the driver `{command}` cannot be started: {why}")]
     Start {
-        /// Its command.
+        /// The command line of the driver.
         command: String,
         /// What the system said.
         why: String,

@@ -81,7 +81,7 @@ impl DriverHost {
         }
     }
 
-    /// Which drivers.
+    /// The drivers that it starts.
     pub fn spec(&self) -> &DriverCellSpec {
         &self.spec
     }

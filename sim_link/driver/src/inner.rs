@@ -33,7 +33,6 @@ pub enum Progress {
     Abandoned,
     /// The motion has begun.
     Accepted,
-    /// It is done.
     Done,
     /// The motion ended elsewhere, and why.
     Stopped(String),

@@ -21,7 +21,6 @@ const POLL: Duration = Duration::from_millis(5);
 
 /// A driver that is reached.
 pub struct Link {
-    /// What it sends.
     pub output: Box<dyn Read + Send>,
     /// What it is sent. Dropping it is the end of its standard input.
     pub input: Box<dyn Write + Send>,

@@ -9,7 +9,7 @@ const MOST: usize = 500;
 /// Longest line in bytes.
 pub const LONGEST: usize = 2048;
 
-/// A line for the log.
+/// A line that a driver wrote for the log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogLine {
     /// How much it matters; standard error counts as [`LogLevel::Info`].

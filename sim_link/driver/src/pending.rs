@@ -12,7 +12,6 @@ use super::options::{DriverOptions, Preparing};
 /// How often a preparation is looked for.
 const POLL: Duration = Duration::from_millis(20);
 
-/// The start.
 #[derive(Debug)]
 pub struct PendingStart {
     driver: String,

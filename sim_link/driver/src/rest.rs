@@ -16,7 +16,7 @@ pub struct Place {
     pub stamp_s: f64,
     /// The joints, where they are known.
     pub joints: Option<JointValues>,
-    /// The tip.
+    /// The pose of the TCP.
     pub base_from_tip: Pose<Base, Tip>,
 }
 

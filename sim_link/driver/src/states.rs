@@ -194,7 +194,6 @@ impl States {
         Ok(())
     }
 
-    /// The newest.
     pub fn newest(&self) -> Option<&Reading> {
         self.readings.back()
     }

@@ -57,8 +57,8 @@ pub enum WireProblem {
         /// What was promised.
         need: u64,
     },
-    /// Not text.
     #[error("not UTF-8")]
+    /// Bytes that are not UTF-8.
     NotText,
     /// No message where one has to be, behind the bytes of another.
     #[error("{what}: it follows the {bytes} bytes of the message before, of which there may be more or fewer")]

@@ -74,7 +74,7 @@ pub enum JogFrame {
 pub enum Jog {
     /// One joint, counted from 0 at the base.
     Joint {
-        /// Which.
+        /// The joint, counted from 0 at the base.
         index: usize,
         /// Towards larger values.
         forward: bool,
@@ -83,7 +83,7 @@ pub enum Jog {
     Translate {
         /// Whose axis.
         frame: JogFrame,
-        /// Which axis.
+        /// The axis, x, y or z.
         axis: Axis,
         /// Which way.
         forward: bool,
@@ -92,7 +92,7 @@ pub enum Jog {
     Rotate {
         /// Whose axis.
         frame: JogFrame,
-        /// Which axis.
+        /// The axis, x, y or z.
         axis: Axis,
         /// Which way.
         forward: bool,

@@ -24,6 +24,8 @@
 //!
 //! Never depends on a window, an estimator of its own, or a session.
 
+#![warn(missing_docs)]
+
 mod drivers;
 mod facts;
 mod goal;

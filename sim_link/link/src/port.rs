@@ -350,7 +350,7 @@ pub enum Newest {
     Awaited,
 }
 
-/// The camera.
+/// What images are fetched by.
 pub trait CameraPort: Send {
     /// The newest images of another instant than the last ones, whose time was `seen_s`. Waits no longer than a tenth of a
     /// second for them.

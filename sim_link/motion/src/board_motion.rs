@@ -114,7 +114,7 @@ impl BoardMotionSpec {
 pub struct OutOfRange {
     /// Which number.
     pub name: &'static str,
-    /// What it is.
+    /// The number that was given.
     pub value: f64,
     /// What it must be.
     pub need: String,

@@ -13,6 +13,8 @@
 //! # Ok::<(), handeye_motion::MotionError>(())
 //! ```
 
+#![warn(missing_docs)]
+
 mod board_motion;
 mod course;
 mod joint;
@@ -30,7 +32,7 @@ pub struct MotionState {
     pub pos: Vec<f64>,
     /// Velocities.
     pub vel: Vec<f64>,
-    /// Accelerations.
+    /// Accelerations, in units of position per s².
     pub accel: Vec<f64>,
 }
 
@@ -89,7 +91,7 @@ pub struct MotionStep {
     pub pos: Vec<f64>,
     /// Velocities.
     pub vel: Vec<f64>,
-    /// Accelerations.
+    /// Accelerations, in units of position per s².
     pub accel: Vec<f64>,
     /// Whether the goal is reached; positions are then exactly the goal's.
     pub finished: bool,
@@ -125,7 +127,7 @@ pub enum MotionError {
         what: &'static str,
         /// Degree of freedom, counted from 0.
         dof: usize,
-        /// Its value.
+        /// The number that was given.
         value: f64,
         /// Sign that it must have.
         sign: &'static str,
@@ -137,7 +139,7 @@ pub enum MotionError {
         what: &'static str,
         /// Degree of freedom, counted from 0.
         dof: usize,
-        /// Its value.
+        /// The number that was given.
         value: f64,
     },
     /// The limits admit no profile, for example because the goal's velocity exceeds them.

@@ -25,7 +25,7 @@ pub struct PoseMotion {
 /// One sample of a pose motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseStep {
-    /// The pose.
+    /// Where it is.
     pub pose: Isometry3<f64>,
     /// Velocities: `[x, y, z, angle]` without a metric, one number with it.
     pub vel: Vec<f64>,

@@ -34,7 +34,6 @@ pub enum ApiError {
     Field {
         /// `missing`, `invalid`, or both.
         problem: &'static str,
-        /// Its name.
         name: &'static str,
     },
     /// Anything else.

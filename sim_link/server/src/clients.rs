@@ -86,7 +86,6 @@ pub enum Waiting {
     Pass(u64),
     /// The return of a callback.
     Callback,
-    /// A time.
     Time(Duration),
 }
 
@@ -99,7 +98,6 @@ pub struct Running {
     pub func: String,
     /// What remains to be done.
     pub task: Box<dyn Task>,
-    /// What it waits for.
     pub waiting: Waiting,
     /// Since when its client has been waiting for word; `None` while it is the client's turn, to run a callback or to
     /// say that it goes on waiting.

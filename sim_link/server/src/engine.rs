@@ -44,7 +44,6 @@ pub enum Due {
     Now,
     /// At a time on the server's clock.
     At(Duration),
-    /// Never.
     Never,
 }
 

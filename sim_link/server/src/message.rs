@@ -44,10 +44,7 @@ pub enum Request {
         values: Vec<Value>,
     },
     /// The client is done.
-    End {
-        /// Which.
-        uuid: String,
-    },
+    End { uuid: String },
     /// No function and no code: answered with an empty map.
     Nothing,
     /// A chunk of Lua.

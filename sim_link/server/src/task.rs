@@ -43,7 +43,6 @@ pub enum Next {
     Pass,
     /// The return of a function of the client.
     Callback {
-        /// Its name.
         name: String,
         /// Its arguments.
         args: Vec<Value>,
@@ -138,7 +137,6 @@ impl Task for WaitTask {
 /// `sim.testCB`: calls a function of the client again and again and returns what it returned last.
 #[derive(Debug)]
 pub struct CallbackTask {
-    /// Its name.
     pub name: String,
     /// Its arguments.
     pub args: Vec<Value>,

@@ -15,6 +15,8 @@
 //!
 //! Never depends on a socket, a client or a cell.
 
+#![warn(missing_docs)]
+
 pub mod axes;
 
 use ciborium::Value;
@@ -124,7 +126,7 @@ pub trait Reader {
     fn number(&self) -> Option<f64>;
     /// An integer, or a float without fraction.
     fn integer(&self) -> Option<i64>;
-    /// A boolean.
+    /// `true` or `false`.
     fn boolean(&self) -> Option<bool>;
     /// Text, or bytes that are UTF-8.
     fn text(&self) -> Option<&str>;

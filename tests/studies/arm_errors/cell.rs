@@ -47,7 +47,6 @@ impl Wrong {
     pub const ALL: [(&str, Self); 4] =
         [("bent", Self::Bent), ("square", Self::Square), ("lens-off", Self::Lens), ("late", Self::Late)];
 
-    /// The board as it is.
     fn board(self, rng: &mut ChaCha8Rng) -> Vec<Point3<f64>> {
         let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
         match self {

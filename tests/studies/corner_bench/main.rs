@@ -25,7 +25,6 @@ use render::{Image, Look, view};
 
 /// A detector by name: the corners in any order, `None` when the board is not found.
 pub struct Detector {
-    /// Its name.
     pub name: &'static str,
     /// Its search.
     pub find: fn(&GrayImage, &Grid) -> Option<Vec<Corner>>,

@@ -65,7 +65,6 @@ impl Scene {
         }
     }
 
-    /// Draws a session.
     pub fn draw(&self, seed: u64) -> Session {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x1e45);
         let rng = &mut rng;

@@ -28,7 +28,6 @@ pub fn solved() -> &'static Solved {
     &SOLVED
 }
 
-/// A copy of the session.
 pub fn copy_of_session() -> (tempfile::TempDir, PathBuf) {
     let home = tempfile::tempdir().expect("a folder");
     let copy = home.path().join("session");

@@ -43,7 +43,6 @@ const LOOKED_FOR: Duration = Duration::from_secs(2);
 pub enum Task {
     /// Nothing.
     Watch,
-    /// It follows.
     Follow(FollowRequest),
     /// It moves once, when the board has been seen for a while.
     Reach {

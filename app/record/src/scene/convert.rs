@@ -73,7 +73,6 @@ pub(super) fn marks(pixels: impl IntoIterator<Item = Vector2<f64>>, colour: Colo
     Points2D::new(pixels).with_colors([colour]).with_radii([Radius::new_ui_points(style::CORNER_UI_POINTS)])
 }
 
-/// Marks at corners.
 pub(super) fn corner_marks(corners: &[Corner], colour: Color) -> Points2D {
     marks(corners.iter().map(|corner| corner.px), colour)
 }
@@ -86,7 +85,6 @@ pub(super) fn outline(target: &TargetSpec, colour: Color) -> LineStrips3D {
         .with_radii([Radius::new_ui_points(style::THIN_UI_POINTS)])
 }
 
-/// The points of a board.
 pub(super) fn board_points(target: &TargetSpec, colour: Color) -> Points3D {
     Points3D::new(target.points().iter().map(point))
         .with_colors([colour])

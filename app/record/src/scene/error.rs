@@ -19,19 +19,14 @@ pub enum RecordError {
     /// A file of a capture cannot be read; everything else of the entry is recorded.
     #[error("{file} of capture {capture} is not in the recording: {reason}", file = file.display())]
     File {
-        /// Which capture.
         capture: u32,
-        /// Which file.
         file: PathBuf,
         /// What is wrong with it.
         reason: Text,
     },
     /// The result has numbers that its file format does not allow; everything else of the entry is recorded.
     #[error("the result is not in the recording as JSON: {reason}")]
-    Result {
-        /// Which.
-        reason: String,
-    },
+    Result { reason: String },
     /// An image could not be compressed; everything else of the entry is recorded.
     #[error("an image of {width}×{height} could not be compressed for {path}: {reason}")]
     Image {

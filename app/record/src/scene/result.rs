@@ -36,7 +36,6 @@ pub(super) fn number(pen: Pen<'_>, path: &str, value: Option<f64>) -> Result<(),
     }
 }
 
-/// Names a series.
 pub(super) fn named(name: &str) -> SeriesLines {
     SeriesLines::new().with_names([name])
 }

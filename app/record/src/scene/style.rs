@@ -36,7 +36,6 @@ pub const TRUE: Color = colour(255, 175, 40);
 pub const SEEN: Color = colour(60, 220, 120);
 /// Corners where the calibration puts them.
 pub const PREDICTED: Color = colour(255, 80, 200);
-/// Residuals.
 pub const RESIDUAL: Color = colour(255, 230, 80);
 /// A capture without residual.
 pub const NEUTRAL: Color = colour(130, 160, 200);

@@ -19,7 +19,6 @@ const WORDS: f32 = 16.0;
 /// An arrow that is shorter says nothing.
 const SHORTEST: f32 = 10.0;
 
-/// Paints it.
 pub fn paint(painter: &Painter, model: &Model, target: &TargetSpec, place: &Place) {
     let Some(hand) = model.by_hand.as_deref() else { return };
     let is_good = hand.judged.is_some_and(|judged| judged.is_good) || hand.waits == HandWaits::Capture;

@@ -20,9 +20,7 @@ pub const CELLS: (usize, usize) = (8, 6);
 pub enum Detected {
     /// It is being looked at.
     NotYet,
-    /// The board.
     Board,
-    /// No board.
     NoBoard,
     /// The image cannot be read.
     Unreadable,
@@ -39,11 +37,9 @@ pub struct RejectedCapture {
 /// One capture with all that is known of it.
 #[derive(Debug, Clone)]
 pub struct CaptureRow {
-    /// Which.
     pub id: CaptureId,
     /// The taught pose at which it was taken.
     pub pose_name: Option<String>,
-    /// What it is for.
     pub role: Role,
     /// Whether a person took it out.
     pub excluded: bool,
@@ -202,7 +198,6 @@ impl CaptureTable {
         Self { rows, coverage, outlined, image_size, made_from: Sources::of(model) }
     }
 
-    /// The row of a capture.
     pub fn row(&self, id: CaptureId) -> Option<&CaptureRow> {
         self.rows.iter().find(|row| row.id == id)
     }

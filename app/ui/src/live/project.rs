@@ -53,15 +53,12 @@ impl Projector<'_> {
 /// A straight line of the board.
 pub type BoardLine = [Point3<f64>; 2];
 
-/// The lines of a board.
 pub struct BoardLines {
-    /// Around it.
     pub around: Vec<BoardLine>,
     /// Through its points.
     pub inside: Vec<BoardLine>,
 }
 
-/// The lines of a board.
 pub fn board_lines(target: &TargetSpec) -> BoardLines {
     let grid = target.grid();
     let side = grid.square_m;

@@ -21,7 +21,6 @@ const BADGE: f32 = 24.0;
 /// Distance between the steps.
 const BETWEEN: f32 = 2.0;
 
-/// The rail.
 pub fn rail_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let steps = steps::steps(model);

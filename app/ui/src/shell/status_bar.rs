@@ -25,7 +25,6 @@ const WIDEST_ANGLE: &str = "−888.8";
 /// So long \[s\] something that went as asked is news.
 const FRESH_S: f64 = 30.0;
 
-/// The bar.
 pub fn status_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     // What is on the screen after a loss is history, and looks like it.

@@ -20,7 +20,6 @@ use handeye_workbench::{motion, session};
 /// Height of the buttons.
 const HEIGHT: f32 = 30.0;
 
-/// The bar.
 pub fn top_bar_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let palette = Palette::of(ui);
     let language = model.view.language;

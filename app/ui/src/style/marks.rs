@@ -19,7 +19,6 @@ pub struct Marks {
     pub predicted: Color32,
     /// The board at a pose that the arm goes to next.
     pub planned: Color32,
-    /// Residuals.
     pub residual: Color32,
     /// What is drawn of a recorded image, so that nobody takes it for the live one.
     pub review: Color32,

@@ -224,7 +224,6 @@ pub fn remembered<T: 'static + Clone + Default + Send + Sync>(ui: &Ui, id: Id) -
     ui.data(|data| data.get_temp(id)).unwrap_or_default()
 }
 
-/// Remembers it.
 pub(crate) fn remember<T: 'static + Clone + Send + Sync>(ui: &Ui, id: Id, value: T) {
     ui.data_mut(|data| data.insert_temp(id, value));
 }

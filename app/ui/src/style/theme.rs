@@ -28,7 +28,6 @@ pub struct Palette {
     pub backdrop: Color32,
     /// Bars at the top and bottom.
     pub bar: Color32,
-    /// Cards.
     pub card: Color32,
     /// Edges of cards and bars.
     pub edge: Color32,

@@ -95,7 +95,6 @@ impl Kind {
     }
 }
 
-/// The board.
 pub fn board_ui(ui: &mut Ui, model: &Model, outbox: &mut Outbox) {
     let language = model.view.language;
     let target = &model.document().meta.target;

@@ -8,7 +8,6 @@ use crate::style::theme;
 use handeye_workbench::command::{Command, Outbox};
 use handeye_workbench::model::Model;
 
-/// What a pane is.
 pub(crate) type PaneUi = fn(&mut Ui, &Model, &mut Outbox);
 
 /// Nothing has to be scrolled to.

@@ -42,7 +42,6 @@ pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Cell> + Send +
 
 /// What an application begins with.
 pub struct Start {
-    /// Which cell.
     pub source: CellSource,
     /// What is remembered from one start to the next.
     pub view: ViewSettings,

@@ -6,10 +6,8 @@ use handeye_geometry::targets::{AprilGrid, AprilTag, Charuco, Dictionary, Grid, 
 
 use super::heading;
 
-/// A target, described.
 #[derive(Debug, Args)]
 pub struct DescribedTarget {
-    /// What it is.
     #[arg(long, value_enum, help_heading = heading::TARGET)]
     kind: Kind,
     /// Inner corners, dots or tags along x.

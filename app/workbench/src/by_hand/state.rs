@@ -9,7 +9,6 @@ use handeye_plan::guided::{Ending, GuidedOptions};
 pub struct ByHand {
     /// What chooses the views.
     pub guide: HandGuide,
-    /// What it waits for.
     pub waits: HandWaits,
     /// The view that is wanted.
     pub wanted: Option<Box<Wanted>>,
@@ -29,7 +28,6 @@ pub struct ByHand {
     pub began_s: f64,
 }
 
-/// What it waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HandWaits {
     /// For the answer from all captures.
@@ -38,7 +36,6 @@ pub enum HandWaits {
     Choice,
     /// For the person to bring the view about.
     View,
-    /// For the capture.
     Capture,
 }
 

@@ -17,7 +17,6 @@ use crate::worker::link::Outlet;
 
 /// A choice that is asked for.
 pub(crate) struct HandJob {
-    /// Its number.
     pub number: u64,
     /// What chooses.
     pub guide: HandGuide,

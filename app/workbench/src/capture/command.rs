@@ -22,15 +22,9 @@ pub enum Command {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Event {
     /// The capture that is under way waits for something else.
-    Waits {
-        /// Its number.
-        number: u64,
-        /// For what.
-        wait: CaptureWait,
-    },
+    Waits { number: u64, wait: CaptureWait },
     /// There is no capture.
     Refused {
-        /// Its number.
         number: u64,
         /// Why.
         refused: CaptureRefused,

@@ -22,7 +22,6 @@ const THUMBNAIL_WIDTH: u32 = 160;
 pub struct Measured {
     /// Its number, from the request.
     pub number: u64,
-    /// What it is for.
     pub purpose: CapturePurpose,
     /// What was looked for.
     pub target: TargetSpec,

@@ -10,7 +10,6 @@ use crate::model::{CaptureOptions, CapturePurpose};
 pub struct CaptureRequest {
     /// Its number, which everything that is reported of it carries.
     pub number: u64,
-    /// What it is for.
     pub purpose: CapturePurpose,
     /// How it is taken.
     pub options: CaptureOptions,

@@ -12,7 +12,6 @@ use crate::text::Text;
 /// The board in the newest image that was searched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveDetection {
-    /// Which frame.
     pub frame: u64,
     /// The corners; `None` when the board was not found.
     pub corners: Option<Corners>,
@@ -30,7 +29,6 @@ pub struct LiveDetection {
     pub dropped: u64,
 }
 
-/// What a capture is for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CapturePurpose {
     /// It enters the fit.
@@ -76,9 +74,7 @@ pub enum CaptureWait {
 pub struct CaptureUnderWay {
     /// Its number, from the command.
     pub number: u64,
-    /// What it is for.
     pub purpose: CapturePurpose,
-    /// What it waits for.
     pub wait: CaptureWait,
     /// Since when.
     pub since_s: f64,
@@ -95,7 +91,6 @@ pub struct CaptureRefused {
     pub at_s: f64,
 }
 
-/// Kinds of refusals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RefusalKind {
     /// The board was not found.

@@ -50,9 +50,7 @@ pub type Preview = Result<Vec<PreviewFile>, Text>;
 /// A file as it would be written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PreviewFile {
-    /// Its name.
     pub name: String,
-    /// Its text.
     pub text: String,
 }
 

@@ -25,9 +25,7 @@ const PREVIEWS: usize = 4;
 
 /// What can be asked for.
 pub struct ImportJob {
-    /// Its number.
     pub number: u64,
-    /// What.
     pub task: ImportTask,
 }
 

@@ -14,7 +14,6 @@ use crate::model::{DepthScale, FrameImages, FrameInfo, ImagePoint, LiveDetection
 pub enum Command {
     /// Which depths the colour map covers.
     SetDepthScale(DepthScale),
-    /// The colours of depths.
     SetDepthColours(ColourMap),
     /// What is drawn over the images.
     SetOverlays(Overlays),

@@ -194,7 +194,6 @@ impl Default for SceneView {
 /// A point that was picked in the live image.
 #[derive(Debug, Clone)]
 pub struct PickedPoint {
-    /// The pixel.
     pub pixel: ImagePoint,
     /// By the tip pose as it is reported: for commands as they are.
     pub as_reported: MeasuredTwice,

@@ -66,7 +66,6 @@ pub enum Link {
     Control,
     /// Images.
     Camera,
-    /// Motions.
     Motion,
 }
 
@@ -98,7 +97,6 @@ pub enum LinkState {
     Lost {
         /// When it broke.
         since_s: f64,
-        /// Why.
         why: Text,
         /// How many times it was tried since.
         attempt: u32,
@@ -172,7 +170,6 @@ pub enum RotationFormat {
 /// What the window remembers from one start to the next.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ViewSettings {
-    /// The colours of depths.
     pub depth_colours: ColourMap,
     /// What is drawn over the images.
     pub overlays: Overlays,
@@ -211,7 +208,6 @@ impl Default for Goal {
 pub struct Model {
     /// Whether the window is shown in browsers, on other machines than the one whose files are read and written.
     pub in_browser: bool,
-    /// Which cell.
     pub source: CellSource,
     /// The present time.
     pub now_s: f64,
@@ -277,7 +273,6 @@ pub struct Model {
     pub by_hand: Option<Box<ByHand>>,
     /// The recording that is being imported.
     pub import: Option<Box<ImportState>>,
-    /// The session.
     pub session: SessionState,
     /// Whether a session is being opened.
     pub opening: bool,

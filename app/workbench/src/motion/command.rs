@@ -57,7 +57,6 @@ pub enum Event {
     Moved {
         /// Which one.
         id: MotionId,
-        /// How.
         outcome: MotionOutcome,
     },
     /// A held jog button can do no more, or may not: the arm stands.

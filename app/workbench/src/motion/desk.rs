@@ -23,7 +23,6 @@ use handeye_wording::text;
 pub enum MotionTask {
     /// To a place.
     Move(MotionRequest),
-    /// A step of a jog.
     JogStep {
         /// Its number.
         id: MotionId,
@@ -80,7 +79,6 @@ impl MotionTask {
 /// What the worker is to do next.
 #[derive(Debug)]
 pub enum Work {
-    /// Nothing.
     Nothing,
     /// A motion, which the token cancels.
     Motion(MotionTask, CancelToken),

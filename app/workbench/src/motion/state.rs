@@ -50,7 +50,6 @@ pub enum Motion {
     Idle,
     /// It is on its way.
     Moving {
-        /// Which motion.
         id: MotionId,
         /// Where to, in words.
         what: Text,

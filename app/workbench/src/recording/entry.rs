@@ -15,7 +15,6 @@ use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, S
 pub enum Entry {
     /// A cell was connected; its truth, where it publishes one.
     Cell(Arc<CellFacts>),
-    /// The robot.
     Robot {
         /// Simulated time \[s\].
         sim_time_s: f64,
@@ -42,7 +41,6 @@ pub enum Entry {
     },
     /// Corners of a capture.
     Observed {
-        /// Which capture.
         id: CaptureId,
         /// What was seen.
         observed: Arc<Observed>,

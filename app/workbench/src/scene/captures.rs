@@ -12,7 +12,6 @@ use crate::model::Solved;
 /// view starts to be named in the findings.
 pub const BAD_AT_MEDIANS: f64 = 3.0;
 
-/// What a capture is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CaptureUse {
     /// It enters the fit.
@@ -30,7 +29,6 @@ pub enum CaptureUse {
 pub struct CaptureItem {
     /// Where its camera was; `None` while nothing says where the camera sits.
     pub base_from_camera: Option<Pose<Base, Camera>>,
-    /// What it is for.
     pub used_as: CaptureUse,
     /// RMS of its residuals \[px\].
     pub rms_px: Option<f64>,
@@ -41,7 +39,6 @@ pub struct CaptureItem {
 /// What a calibration says of a capture: of its fit, or of its verification.
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome<'a> {
-    /// The residuals of its corners.
     pub residuals: &'a [CornerResidual],
     /// Where its board is by the calibration.
     pub camera_from_target: Option<Pose<Camera, Target>>,

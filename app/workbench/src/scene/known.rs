@@ -56,7 +56,6 @@ pub struct Known {
     pub document_mode: Option<Mode>,
     /// What is looked at.
     pub target: Option<TargetSpec>,
-    /// The cell.
     pub cell: Option<CellFacts>,
     /// The truth that the document keeps.
     pub document_truth: Option<Truth>,

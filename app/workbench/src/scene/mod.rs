@@ -26,9 +26,7 @@ use crate::model::{Model, SceneView};
 /// Where something is fixed.
 #[derive(Debug, Clone, Copy)]
 pub enum Fixed<F: Frame> {
-    /// In the base.
     Base(Pose<Base, F>),
-    /// On the tip.
     Tip(Pose<Tip, F>),
 }
 
@@ -74,9 +72,7 @@ pub struct Item<F: Frame, Shape> {
     pub shape: Option<Shape>,
 }
 
-/// A camera.
 pub type CameraItem = Item<Camera, Intrinsics>;
-/// A board.
 pub type BoardItem = Item<Target, TargetSpec>;
 
 /// What will stand at a pose that the arm goes to.

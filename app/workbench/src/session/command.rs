@@ -39,14 +39,12 @@ pub enum Command {
     BackToLive,
     /// Take captures out of the fit, or back in.
     SetExcluded {
-        /// Which.
         ids: Vec<CaptureId>,
         /// Out.
         excluded: bool,
     },
     /// Captures enter the fit or verify it.
     SetPurpose {
-        /// Which.
         ids: Vec<CaptureId>,
         /// What they are for.
         purpose: CapturePurpose,
@@ -72,13 +70,9 @@ pub enum Event {
         exported: bool,
     },
     /// A session could not be begun, opened or copied.
-    Failed {
-        /// Why.
-        why: Text,
-    },
+    Failed { why: Text },
     /// A capture was looked at.
     Observed {
-        /// Which.
         id: CaptureId,
         /// What was looked for.
         target: TargetSpec,
@@ -88,7 +82,6 @@ pub enum Event {
     },
     /// The images of a capture were read.
     Review {
-        /// Which capture.
         id: CaptureId,
         /// The pixels, which a log does not keep.
         #[serde(skip)]

@@ -140,7 +140,6 @@ impl SessionThreads {
         self.importer.cancel();
     }
 
-    /// Cancels the solve.
     pub(crate) fn cancel_solve(&self) {
         self.solver.cancel();
     }

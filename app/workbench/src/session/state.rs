@@ -60,7 +60,6 @@ pub struct Observed {
 /// The capture whose image is looked at instead of the live one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Review {
-    /// Which capture.
     pub id: CaptureId,
     /// Its images, once they are read from the disk.
     pub images: Option<Arc<FrameImages>>,
@@ -122,16 +121,13 @@ impl PoseSequence {
 /// An entry of a folder, for the dialogs that open and save.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FolderEntry {
-    /// Its name.
     pub name: String,
-    /// What it is.
     pub kind: FolderKind,
 }
 
 /// What an entry of a folder is to this program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum FolderKind {
-    /// A session.
     Session,
     /// Recorded images and poses.
     Dataset,
@@ -146,7 +142,6 @@ pub enum FolderKind {
 /// The content of a folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FolderListing {
-    /// Which folder.
     pub folder: PathBuf,
     /// Its folders and files of poses by name; or why it cannot be read.
     pub entries: Result<Vec<FolderEntry>, String>,

@@ -88,7 +88,6 @@ pub enum Dialog {
     Palette,
     /// All keys.
     Help,
-    /// What this is.
     About,
     /// The address of the web viewer, where no browser shows it by itself.
     RerunAddress,

@@ -34,7 +34,6 @@ pub enum Command {
 pub enum Event {
     /// A solve goes on.
     Progress {
-        /// Which.
         job: JobId,
         /// What it does.
         stage: Stage,
@@ -43,12 +42,7 @@ pub enum Event {
     },
     /// A solve has ended.
     #[serde(skip)]
-    Ended {
-        /// Which.
-        job: JobId,
-        /// How.
-        outcome: SolveOutcome,
-    },
+    Ended { job: JobId, outcome: SolveOutcome },
 }
 
 /// How a solve ended.

@@ -16,11 +16,9 @@ const GAUSSIAN: f64 = 1e5;
 /// One thing to say.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EstimatedValue {
-    /// What it is.
     pub what: Text,
     /// How much, with its unit.
     pub value: Text,
-    /// What that means.
     pub meaning: Text,
     /// Why, where there is a reason.
     pub why: Option<Text>,

@@ -20,11 +20,9 @@ pub struct JobId(pub u64);
 /// A finished solve.
 #[derive(Debug, Clone)]
 pub struct Solved {
-    /// Which job.
     pub job: JobId,
     /// The captures, in the order of the views of `calibration` and of `result`.
     pub captures: Vec<CaptureId>,
-    /// The calibration.
     pub calibration: Calibration,
     /// The document that is exported and compared.
     pub result: CalibrationResult,
@@ -81,7 +79,6 @@ pub enum SolveStatus {
     Idle,
     /// It is at work.
     Running {
-        /// On which job.
         job: JobId,
         /// What it does.
         stage: Stage,

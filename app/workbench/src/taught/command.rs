@@ -30,7 +30,6 @@ pub enum Command {
     },
     /// Visit a taught pose earlier or later.
     Reorder {
-        /// Which.
         name: String,
         /// Its place afterwards, counted from 0.
         to: usize,

@@ -17,7 +17,6 @@ use crate::taught::sequence::{continue_sequence, plan_verification, planned, run
 use crate::worker::{FileTask, SessionThreads};
 use handeye_wording::text;
 
-/// The reference poses.
 pub fn reference_poses() -> Vec<TaughtPose> {
     match TaughtPoses::parse(Path::new("seed10"), REFERENCE_POSES) {
         Ok(taught) => taught.poses,

@@ -81,7 +81,6 @@ pub enum FollowStatus {
     Off,
     /// It moves to a place from which it has room to follow.
     MakingRoom,
-    /// It follows.
     Following {
         /// Distance of the tip from its goal \[m\].
         distance_m: f64,

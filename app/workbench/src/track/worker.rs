@@ -42,7 +42,6 @@ pub struct TrackedImage<'a> {
     pub number: u64,
     /// When it arrived.
     pub received_s: f64,
-    /// The image.
     pub image: Image<'a>,
     /// Where the board was, if the cell publishes it; only ever compared with.
     pub base_from_target_true: Option<Pose<Base, Target>>,
@@ -66,7 +65,6 @@ impl Tracking {
         Ok(Self { tracker: Tracker::new(by.setup.clone())?, by, line, rate: RateMeter::default() })
     }
 
-    /// By what it tracks.
     pub fn by(&self) -> &TrackedBy {
         &self.by
     }

@@ -31,7 +31,6 @@ pub enum FileTask {
     Review {
         /// The session.
         folder: PathBuf,
-        /// The capture.
         capture: Box<CaptureRecord>,
         /// The colours of its depths.
         colours: ColourMap,
@@ -44,7 +43,6 @@ pub enum FileTask {
     Preview(Box<ExportJob>),
     /// Write the chosen formats.
     Export {
-        /// What.
         job: Box<ExportJob>,
         /// Names of formats.
         formats: Vec<String>,
@@ -59,16 +57,13 @@ pub enum FileTask {
     WriteKeepOut {
         /// Where.
         file: PathBuf,
-        /// What.
         text: String,
         /// Whether a person waits for it to be reported.
         is_wished: bool,
     },
     /// Write a board for a printer.
     PrintTarget {
-        /// Which.
         target: TargetSpec,
-        /// On which page.
         page: Page,
         /// Where.
         file: PathBuf,
@@ -79,7 +74,6 @@ pub enum FileTask {
     WritePoses {
         /// Where.
         file: PathBuf,
-        /// What.
         poses: Vec<TaughtPose>,
         /// Which joints of the arm are prismatic, counted from 0 at the base.
         prismatic: Vec<usize>,
@@ -89,7 +83,6 @@ pub enum FileTask {
 /// What exports are made of.
 #[derive(Debug, Clone)]
 pub struct ExportJob {
-    /// The result.
     pub result: CalibrationResult,
     /// Names of frames and files.
     pub names: ExportNames,

@@ -88,7 +88,6 @@ pub trait Duty: Send {
 pub struct LinkLoop<'a, D: Duty> {
     /// What it does.
     pub duty: D,
-    /// How it connects.
     pub connector: &'a dyn Cell,
     /// What it is asked for; closed when the application ends.
     pub requests: Receiver<Request<D::Task>>,

@@ -6,7 +6,7 @@ use crate::{Arm, Joint, JointKind};
 /// An arm as a URDF file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ArmFile {
-    /// Its name.
+    /// Name of the arm, as the file has it.
     pub name: &'static str,
     /// The text of the file.
     pub urdf: &'static str,

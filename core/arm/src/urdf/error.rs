@@ -64,7 +64,7 @@ pub enum UrdfProblem {
         "the {end} of joint \"{joint}\" is link \"{link}\", which the file does not have: add the link or correct the name"
     )]
     UnknownLink {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// `parent` or `child`.
         end: &'static str,
@@ -77,7 +77,7 @@ pub enum UrdfProblem {
          cannot be computed with; leave one of the joints out"
     )]
     TwoParents {
-        /// The link.
+        /// Name of the link in the file.
         link: String,
         /// One joint.
         first: String,
@@ -124,7 +124,7 @@ pub enum UrdfProblem {
          name a base link behind it"
     )]
     Unsupported {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// Its type as the file has it.
         kind: String,
@@ -135,7 +135,7 @@ pub enum UrdfProblem {
          name a tip link in front of it, or make it fixed"
     )]
     Mimic {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// The one it follows.
         of: String,
@@ -143,7 +143,7 @@ pub enum UrdfProblem {
     /// Text where numbers belong, too many of them, or one that is not finite.
     #[error("{attribute} of joint \"{joint}\" is \"{text}\": it takes {needs}")]
     BadNumber {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// Element and attribute.
         attribute: &'static str,
@@ -155,7 +155,7 @@ pub enum UrdfProblem {
     /// No direction.
     #[error("the axis of joint \"{joint}\" is 0 0 0: give its direction, for example 0 0 1")]
     ZeroAxis {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
     },
     /// A revolute or prismatic joint without an end.
@@ -163,7 +163,7 @@ pub enum UrdfProblem {
         "{kind} joint \"{joint}\" has no <limit> with lower and upper: add them; a joint that turns without end is continuous"
     )]
     NoLimit {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// Its type.
         kind: String,
@@ -171,7 +171,7 @@ pub enum UrdfProblem {
     /// No room between the limits.
     #[error("joint \"{joint}\" goes from {lower} to {upper}: lower has to be below upper")]
     InvertedLimit {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// Lower limit, radians or metres.
         lower: f64,
@@ -181,7 +181,7 @@ pub enum UrdfProblem {
     /// A speed that lets it stand still for ever.
     #[error("the velocity of joint \"{joint}\" is {speed}: it has to be above zero, or left out when it is not known")]
     BadSpeed {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// What it says.
         speed: f64,
@@ -191,7 +191,7 @@ pub enum UrdfProblem {
         "{what} of joint \"{joint}\" is {length_m} m, longer than any arm: lengths of a URDF are in metres, are these millimetres?"
     )]
     TooLong {
-        /// The joint.
+        /// Name of the joint in the file.
         joint: String,
         /// What is so long.
         what: &'static str,

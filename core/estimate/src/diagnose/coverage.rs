@@ -31,9 +31,9 @@ pub struct Outline {
 /// A view as coverage sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct CoveredView<'a> {
-    /// Its name.
+    /// Name of the view, as findings cite it.
     pub name: &'a str,
-    /// Its corners.
+    /// The corners that were detected in it.
     pub corners: &'a [Corner],
     /// Whether its corners count; its outline is there either way.
     pub in_fit: bool,

@@ -20,7 +20,7 @@ pub struct FindingRecord {
 /// One number with its unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EvidenceRecord {
-    /// What it is.
+    /// Name of the number.
     pub name: String,
     /// Its value; `None` when it is not finite.
     pub value: Option<f64>,

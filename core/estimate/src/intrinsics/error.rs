@@ -38,7 +38,7 @@ pub enum IntrinsicsError {
     /// The lens that was given folds back where the target was seen.
     #[error("the known camera: {fold}; the target was seen as far as {seen_px:.0} px from the principal point")]
     FoldsBack {
-        /// The fold.
+        /// Where the distortion folds back.
         fold: Box<FoldsBack>,
         /// Distance of the farthest corner from the principal point, pixels.
         seen_px: f64,
@@ -60,7 +60,7 @@ pub enum IntrinsicsError {
          capture views tilted by 20° or more about different axes"
     )]
     Undetermined {
-        /// Which parameter.
+        /// The parameter of the lens that the views leave open.
         parameter: &'static str,
         /// Its standard deviation for 0.1 px of noise, in pixels.
         sigma_px: f64,

@@ -23,7 +23,7 @@ const MANY: f64 = 1e6;
 /// A session whose lens differs from that of the others by more than chance explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OddSession {
-    /// Its name.
+    /// Name of the session.
     pub name: String,
     /// Its focal length fx by itself, pixels.
     pub focal_px: f64,

@@ -78,7 +78,7 @@ pub enum SharedLensError {
          (`fixed = false` in its [camera]), or calibrate that session by itself"
     )]
     FixedLens {
-        /// Which session.
+        /// Name of the session.
         session: String,
     },
     /// Images of unequal size.
@@ -87,7 +87,7 @@ pub enum SharedLensError {
          calibrate those of each size together", size.0, size.1, first_size.0, first_size.1
     )]
     ImageSize {
-        /// Which session.
+        /// Name of the session.
         session: String,
         /// Size of its images.
         size: (u32, u32),
@@ -102,13 +102,13 @@ pub enum SharedLensError {
          all sessions"
     )]
     LensModel {
-        /// Which session.
+        /// Name of the session.
         session: String,
         /// Its model.
         model: &'static str,
         /// The session it is compared with.
         first: String,
-        /// Its model.
+        /// The lens model of the first session.
         first_model: &'static str,
     },
     /// No hand-eye transform to estimate.
@@ -116,19 +116,19 @@ pub enum SharedLensError {
         "{session} has no robot poses: sessions share their lens in a hand-eye calibration, a camera alone does not"
     )]
     NoRobot {
-        /// Which session.
+        /// Name of the session.
         session: String,
     },
     /// Poses of the target without corners.
     #[error("{session} has poses of the target and no corners, which say nothing of the lens: leave it out")]
     NoCorners {
-        /// Which session.
+        /// Name of the session.
         session: String,
     },
     /// One session cannot be calibrated.
     #[error("{session}: {error}")]
     Session {
-        /// Which.
+        /// Name of the session.
         session: String,
         /// Why.
         error: CalibrateError,
@@ -156,7 +156,7 @@ impl SharedLensError {
 /// A session by its name in messages.
 #[derive(Debug, Clone, Copy)]
 pub struct NamedSession<'a> {
-    /// Its name.
+    /// Name of the session, for messages.
     pub name: &'a str,
     /// What was observed.
     pub observations: &'a Observations,

@@ -34,7 +34,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// A number with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimated {
-    /// The value.
+    /// The estimate.
     pub value: f64,
     /// One standard deviation.
     pub sigma: f64,

@@ -98,7 +98,7 @@ pub enum VerifyError {
 /// What one capture says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaptureCheck {
-    /// Its name.
+    /// Name of the capture.
     pub name: String,
     /// RMS of the 2-D distances between measured corners and those that the bare chain predicts, pixels.
     pub rms_px: f64,

@@ -12,9 +12,9 @@ use handeye_geometry::point_error;
 /// A point that the camera measured.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredPoint {
-    /// In the camera.
+    /// Where it is in the camera, metres.
     pub in_camera: PointIn<Camera>,
-    /// In the base.
+    /// Where it is in the base of the robot, metres.
     pub in_base: PointIn<Base>,
     /// Covariance in base axes, square metres, as far as the hand-eye transform causes it, and the errors of the arm where the tip is
     /// corrected for them: the noise of this robot pose, of the depth or the corners, and of the lens come on top. `None` when the

@@ -43,7 +43,7 @@ pub enum CameraError {
     BadParameter {
         /// Which one.
         name: &'static str,
-        /// Its value.
+        /// The value of the parameter, pixels or without a unit.
         value: f64,
     },
 }

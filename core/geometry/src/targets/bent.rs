@@ -65,7 +65,7 @@ impl BoardPoints {
         self.drawn.is_empty()
     }
 
-    /// The points as drawn.
+    /// Its points as they are drawn, in target axes, metres.
     pub fn drawn(&self) -> &[Point3<f64>] {
         &self.drawn
     }

@@ -74,7 +74,7 @@ impl Dictionary {
         self.name().starts_with("apriltag")
     }
 
-    /// OpenCV's number of it.
+    /// The number of `cv::aruco::PredefinedDictionaryType`.
     pub fn opencv_number(self) -> i32 {
         i32::from(self.0)
     }

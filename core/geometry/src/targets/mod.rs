@@ -79,7 +79,7 @@ impl Grid {
 pub struct BadTarget {
     /// Which, as a data set calls it.
     pub key: &'static str,
-    /// What it is.
+    /// The number as it was stated.
     pub value: String,
     /// What it may be.
     pub want: &'static str,

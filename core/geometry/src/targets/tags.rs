@@ -262,7 +262,7 @@ pub struct AprilTag {
     pub tag_m: f64,
     /// Its number in the family.
     pub id: usize,
-    /// Its family.
+    /// The dictionary that the tag is of.
     pub family: Dictionary,
     /// Width of the black border in bits, 1 where it is not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -5,7 +5,6 @@ use crate::recording::FoundCamera;
 use crate::value::Value;
 use handeye_geometry::camera::{Distortion, Intrinsics};
 
-/// The cameras in a document.
 pub(super) fn of_document(value: &Value, file: &str) -> Vec<FoundCamera> {
     let kalibr = kalibr(value, file);
     if !kalibr.is_empty() {

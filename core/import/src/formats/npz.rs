@@ -53,7 +53,6 @@ impl Format for NumPy {
     }
 }
 
-/// An array.
 struct Array {
     name: String,
     shape: Vec<usize>,

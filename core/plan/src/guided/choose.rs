@@ -101,7 +101,6 @@ pub struct Plan {
 pub(crate) struct Chooser<'a> {
     /// The model of the calibration so far.
     pub model: &'a ViewModel,
-    /// The target.
     pub target: &'a TargetSpec,
     /// Which views of it are looked for.
     pub range: &'a ViewRange,

@@ -88,7 +88,7 @@ const CAREFUL_NOISE: Noise = Noise { corner_px: 0.02, robot_m: 2e-5, robot_rad: 
 pub struct GuidedOptions {
     /// The 95 % error that is to be reached, metres, see [`Calibration::promised`].
     pub goal_m: f64,
-    /// Views at the most.
+    /// Views after which the session ends, goal or not.
     pub most_views: usize,
     /// Time at the most, seconds.
     pub most_s: f64,
@@ -161,7 +161,7 @@ pub enum Next {
 pub enum Why {
     /// A small turn about an axis of the tip, because nothing is known of where the camera sits. Radians.
     FirstTurns {
-        /// The turn.
+        /// Angle of the turn, radians.
         turn_rad: f64,
     },
     /// A tilt of the camera about the board by a rough answer, because the small turns determine none. Radians.
@@ -233,7 +233,7 @@ pub struct Step {
     pub base_from_tip: Pose<Base, Tip>,
     /// The joint values there; `None` for an arm whose chain is not known.
     pub joints: Option<JointValues>,
-    /// Why.
+    /// What the step is for.
     pub why: Why,
     /// The 95 % error after it, as that of [`Why::Gain`], metres; `None` until there is one.
     pub achieved_m: Option<f64>,

@@ -25,7 +25,7 @@ pub enum SurroundingsError {
     /// The file system does not give it.
     #[error("{file} cannot be read: {source}", file = file.display())]
     Unreadable {
-        /// The file.
+        /// The file that was read.
         file: PathBuf,
         /// Why.
         source: std::io::Error,
@@ -33,7 +33,7 @@ pub enum SurroundingsError {
     /// Not TOML, or an unknown or missing key.
     #[error("{file}: {message}", file = file.display())]
     Syntax {
-        /// The file.
+        /// The file that was read.
         file: PathBuf,
         /// What the parser says, with the line.
         message: String,
@@ -41,7 +41,7 @@ pub enum SurroundingsError {
     /// A value that makes no sense.
     #[error("{file}, {entry}", file = file.display(), entry = entry.with_fault(fault))]
     Entry {
-        /// The file.
+        /// The file that was read.
         file: PathBuf,
         /// Which one.
         entry: EntryName,
@@ -56,7 +56,7 @@ pub enum SurroundingsError {
 pub enum EntryFault {
     /// A number that is none.
     NotFinite {
-        /// The key.
+        /// The key of the entry.
         key: &'static str,
     },
     /// An edge that has no length.
@@ -66,9 +66,9 @@ pub enum EntryFault {
     },
     /// Farther than any arm reaches.
     Millimetres {
-        /// The key.
+        /// The key of the entry.
         key: &'static str,
-        /// The value.
+        /// The number as it stands in the file.
         value: f64,
     },
     /// A quaternion of another length.
@@ -76,23 +76,23 @@ pub enum EntryFault {
         /// Its length.
         norm: f64,
     },
-    /// Two rotations.
+    /// A box that has both `rotation_xyzw` and `yaw_deg`.
     TwoRotations,
     /// A volume without room.
     InsideOut {
-        /// The axis.
+        /// The axis whose limits are the wrong way round.
         axis: char,
     },
     /// A speed that is none.
     Speed {
-        /// The key.
+        /// The key of the entry.
         key: &'static str,
-        /// The value.
+        /// The number as it stands in the file.
         value: f64,
     },
     /// A tip faster than any arm.
     MillimetresPerSecond {
-        /// The value.
+        /// The number as it stands in the file.
         value: f64,
     },
     /// Nothing to call it by.
@@ -146,14 +146,14 @@ impl Error for EntryFault {}
 /// An entry of a file, as messages name it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum EntryName {
-    /// A box.
+    /// A box of `[[box]]`.
     Box {
         /// Counted from 1.
         number: usize,
         /// What it is called.
         name: String,
     },
-    /// A table.
+    /// Any other table, by its name.
     Table(&'static str),
 }
 
@@ -225,7 +225,7 @@ pub struct KeepInVolume {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeepBelow {
-    /// Of the tip, m/s.
+    /// Largest speed of the tip, m/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_speed_m_s: Option<f64>,
     /// Of every joint that turns, degrees/s.

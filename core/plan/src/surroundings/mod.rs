@@ -40,7 +40,7 @@ pub struct WorkVolume {
 /// Limits of speed; `None` for what only the arm limits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpeedLimits {
-    /// Of the tip, m/s.
+    /// Largest speed of the tip, m/s.
     pub tip_m_s: Option<f64>,
     /// Of every joint that turns, rad/s.
     pub joint_rad_s: Option<f64>,

@@ -38,7 +38,7 @@ const LIMITS: SpeedLimits = SpeedLimits { tip_m_s: Some(0.25), joint_rad_s: Some
 /// What came of moves. See [`session`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tally {
-    /// Sessions.
+    /// Sessions that were run.
     pub sessions: usize,
     /// Moves that were made.
     pub moves: usize,

@@ -24,7 +24,7 @@ use handeye_geometry::testing::BOARD;
 use handeye_simulate::links::{Field, Links, noise_twist, robot_error};
 use handeye_simulate::session::{REALISTIC, bent, camera, seen};
 
-/// Arms of the cell.
+/// The arm of the cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellArm {
     /// UR5e, six joints, closed form.
@@ -62,7 +62,7 @@ impl CellArm {
 /// What a cell is made from.
 #[derive(Debug, Clone, Copy)]
 pub struct CellSetup {
-    /// The arm.
+    /// Its arm.
     pub arm: CellArm,
     /// Where the camera sits.
     pub mode: Mode,
@@ -122,7 +122,7 @@ pub struct Places {
 /// the RMS spread of the tip in a guided session.
 const FIELD_SPREAD_M: f64 = 0.15;
 
-/// The cell.
+/// A cell in which guided sessions are run, with its truth.
 #[derive(Debug, Clone)]
 pub struct GuidedCell {
     setup: CellSetup,

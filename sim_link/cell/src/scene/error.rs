@@ -49,7 +49,6 @@ pub enum SceneError {
         line: Option<usize>,
         /// Dotted name of the field.
         field: String,
-        /// Its value.
         value: String,
         /// What it must be.
         need: String,

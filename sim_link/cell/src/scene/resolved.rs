@@ -56,7 +56,6 @@ pub struct ResolvedScene {
     pub tip_from_camera: Pose<Tip, Camera>,
     /// Pose of the vision sensor (`/UR5/3D_camera`) in the tip: the camera in CoppeliaSim's axes.
     pub tip_from_sensor: Pose<Tip, Sensor>,
-    /// Pose of the target.
     pub base_from_target: Pose<Base, Target>,
     /// Pose of the printed sheet (`/Plane`) in the world: origin in its centre, z out of the printed side.
     pub world_from_plane: Isometry3<f64>,

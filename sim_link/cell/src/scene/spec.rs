@@ -342,7 +342,6 @@ impl Default for LightSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RelativeTo {
-    /// The world.
     #[default]
     World,
     /// The sheet of the board; the solid goes where its random offset takes it.

@@ -42,7 +42,6 @@ pub enum WorldError {
     /// The world holds as many objects, or nests them as deeply, as it takes.
     #[error("the built-in cell holds no more than {limit} {what}.")]
     TooMany {
-        /// Of what.
         what: &'static str,
         /// How many.
         limit: usize,

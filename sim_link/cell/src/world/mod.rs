@@ -39,7 +39,6 @@ pub enum Sensors {
     One(Handle),
     /// All that the simulation handles.
     AllButExplicit,
-    /// All.
     All,
 }
 

@@ -68,7 +68,6 @@ impl Default for Simulation {
 }
 
 impl Simulation {
-    /// Its state.
     pub fn state(&self) -> State {
         self.state
     }

@@ -32,7 +32,6 @@ pub enum Chain {
 pub enum Kind {
     /// A solid.
     Shape,
-    /// A joint.
     Joint(Box<Joint>),
     /// A frame without extent.
     Dummy {
@@ -63,7 +62,6 @@ impl Kind {
 pub struct Object {
     /// Name, not unique.
     pub alias: String,
-    /// What it is.
     pub kind: Kind,
     /// Whether it is the base of a model, which `:` in a path looks for.
     pub model_base: bool,

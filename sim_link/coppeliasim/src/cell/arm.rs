@@ -34,9 +34,9 @@ const STOP_FUNCTION: &str = "handeye.stop";
 /// How far from its goal a tip may stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionTolerance {
-    /// Distance (m).
+    /// Of the position, metres.
     pub distance_m: f64,
-    /// Angle (rad).
+    /// Of the orientation, radians.
     pub angle_rad: f64,
 }
 

@@ -108,7 +108,7 @@ impl Workspace {
 /// Where the tip should be at the moment, and how it should move on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FollowGoal {
-    /// The tip.
+    /// The pose of the tip that is to be reached.
     pub base_from_tip: Pose<Base, Tip>,
     /// Velocity of the tip, in base axes [m/s].
     pub velocity_m_s: Vector3<f64>,
@@ -150,14 +150,14 @@ pub enum FollowEnd {
     Workspace,
     /// A joint, counted from 1 at the base, is at its limit.
     JointLimit {
-        /// Which joint.
+        /// The joint, counted from 1 at the base.
         joint: usize,
     },
     /// The arm is nearly stretched or folded so that some direction needs joints faster than they are.
     Singular,
     /// Something else moves this joint, counted from 1 at the base, or holds it.
     NotFollowing {
-        /// Which joint.
+        /// The joint, counted from 1 at the base.
         joint: usize,
     },
     /// The tip is not where the kinematics has it; nothing was moved.

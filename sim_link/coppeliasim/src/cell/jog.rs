@@ -16,19 +16,19 @@ use crate::error::LinkError;
 /// What the arm is asked for, in messages.
 const TASK: &str = "jogging the arm";
 
-/// A jog of the arm.
+/// A jog of one joint, along an axis or about one.
 #[derive(Debug, Clone, Copy)]
 pub enum ArmJog<'a> {
     /// One joint, counted from 0 at the base.
     Joint {
-        /// Which.
+        /// The joint, counted from 0 at the base.
         index: usize,
         /// Towards larger values.
         forward: bool,
     },
     /// The tip along a direction of some axes; its orientation stays.
     Line {
-        /// What its kinematics is.
+        /// The chain of the arm.
         kinematics: &'a ArmKinematics,
         /// Whose axes.
         axes: JogAxes,
@@ -38,7 +38,7 @@ pub enum ArmJog<'a> {
     /// The tip about a direction of some axes, right-handed; the origin of the axes stays, for those of the base that
     /// of the tip.
     Turn {
-        /// What its kinematics is.
+        /// The chain of the arm.
         kinematics: &'a ArmKinematics,
         /// Whose axes.
         axes: JogAxes,
@@ -71,7 +71,7 @@ pub enum JogEnd {
     Obstacle(JogObstacle),
     /// Something else moves this joint, counted from 1 at the base, or holds it.
     NotFollowing {
-        /// Which joint.
+        /// The joint, counted from 1 at the base.
         joint: usize,
     },
     /// The tip is not where the kinematics has it; nothing was moved.

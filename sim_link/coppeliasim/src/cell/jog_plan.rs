@@ -191,7 +191,6 @@ fn stopping_speed(distance: f64, acceleration: f64, dt_s: f64) -> f64 {
 pub(super) struct Watch<'a> {
     /// What it may come near to.
     pub guard: Guard<'a>,
-    /// The arm.
     pub arm: &'a planning::Arm,
 }
 

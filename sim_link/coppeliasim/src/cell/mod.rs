@@ -126,12 +126,12 @@ impl CellClient {
         &self.info
     }
 
-    /// The arm.
+    /// The connection that commands the arm.
     pub fn arm(&mut self) -> &mut Arm {
         &mut self.arm
     }
 
-    /// The camera.
+    /// The connection that fetches images.
     pub fn camera(&mut self) -> &mut CameraFeed {
         &mut self.camera
     }

@@ -22,7 +22,7 @@ const MOMENT_FUNCTION: &str = "handeye.moment";
 /// The truth about a simulated cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroundTruth {
-    /// The camera on the tip.
+    /// The camera on the tip as the scene has it.
     pub tip_from_camera: Pose<Tip, Camera>,
     /// The target in the base; `None` when the cell does not publish where its target's origin is.
     pub base_from_target: Option<Pose<Base, Target>>,

@@ -24,7 +24,7 @@ const LEAST_VIEWS: usize = 2;
 pub struct BoardInView {
     /// Where it is.
     pub base_from_target: Pose<Base, Target>,
-    /// What it is.
+    /// The target that is to be seen.
     pub target: TargetSpec,
     /// The lens.
     pub intrinsics: Intrinsics,

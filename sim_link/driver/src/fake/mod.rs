@@ -46,7 +46,7 @@ pub struct FakeOptions {
     pub seed: Option<u64>,
     /// A cell that runs already.
     pub connect: Option<Endpoint>,
-    /// Which part it is.
+    /// Robot, camera or both.
     pub part: FakePart,
     /// Where its clock begins \[s\].
     pub clock_s: f64,

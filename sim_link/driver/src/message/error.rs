@@ -32,7 +32,7 @@ pub enum BadMessage {
     /// A field has a value that it cannot have.
     #[error("{field}: {why}")]
     Value {
-        /// Which field.
+        /// The field of the message.
         field: &'static str,
         /// What is wrong with it.
         why: String,
@@ -40,7 +40,7 @@ pub enum BadMessage {
     /// A transform is none.
     #[error("{field}: {why}")]
     Pose {
-        /// Which field.
+        /// The field of the message.
         field: &'static str,
         /// What is wrong with it.
         why: String,

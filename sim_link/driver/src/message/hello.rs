@@ -51,7 +51,7 @@ handeye_wording::plain_values!(Ability);
 /// A joint as the driver's `hello` has it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointMessage {
-    /// Its name.
+    /// The name that the driver gives.
     pub name: String,
     /// How it moves; revolute where absent.
     #[serde(default = "revolute")]
@@ -74,7 +74,7 @@ fn revolute() -> JointKind {
 pub enum ArmMessage {
     /// An arm that is built in, by its name.
     Name(String),
-    /// A URDF.
+    /// An arm as a URDF file.
     Urdf {
         /// The path of a file, or the text itself, which begins with `<`.
         urdf: String,
@@ -137,9 +137,9 @@ pub struct CameraMessage {
 pub struct Hello {
     /// Version of the protocol that it speaks.
     pub protocol: u32,
-    /// What it is.
+    /// The name that the driver gives.
     pub name: String,
-    /// Its version.
+    /// Version of the driver, in its own numbering.
     #[serde(default)]
     pub version: String,
     /// What its stamps count: `monotonic`, `unix`, or any other word for people. They are seconds in each case.

@@ -173,7 +173,7 @@ pub enum FromDriver {
     Disarmed(DisarmedMessage),
     /// `hello` comes later.
     Preparing(PreparingMessage),
-    /// For the log.
+    /// A line for the log.
     Log(LogMessage),
     /// The driver cannot go on and ends.
     Error(LogMessage),

@@ -85,7 +85,7 @@ impl RosbridgeServer {
         format!("ws://{}", self.address)
     }
 
-    /// Its port.
+    /// The port that it listens on.
     pub fn port(&self) -> u16 {
         self.address.port()
     }

@@ -29,11 +29,9 @@ use handeye_wire as wire;
 /// A call of a function.
 #[derive(Debug)]
 pub struct Call<'a> {
-    /// The cell.
     pub cell: &'a mut Cell,
     /// Who calls.
     pub client: &'a mut Client,
-    /// With what.
     pub args: &'a Args,
     /// Passes since the server was started.
     pub step: u64,
@@ -109,7 +107,6 @@ impl Registry {
         registry
     }
 
-    /// The names of the namespaces.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.namespaces.keys().copied()
     }
@@ -146,7 +143,6 @@ impl Registry {
     }
 }
 
-/// Nothing.
 #[expect(clippy::unnecessary_wraps, reason = "it stands at the end of functions that return an outcome")]
 fn nothing() -> Outcome {
     Ok(Answer::Values(Vec::new()))

@@ -37,7 +37,6 @@ enum Form {
     Positional { aux: Value, notation: Notation },
 }
 
-/// What moves.
 #[derive(Debug)]
 enum Mover {
     /// Nothing: a callback does something with the pose.

@@ -14,7 +14,6 @@ const HANDSHAKE_LIMIT: Duration = Duration::from_secs(10);
 /// What a client asks for.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Incoming {
-    /// A request.
     Request(Vec<u8>),
     /// A request of so many bytes, which was not kept.
     TooLong(usize),

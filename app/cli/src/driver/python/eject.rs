@@ -14,7 +14,6 @@ use handeye_workbench::arguments::heading;
 /// Options of `handeye driver eject`.
 #[derive(Debug, Args)]
 pub struct EjectArgs {
-    /// Which driver.
     #[arg(value_name = "DRIVER", value_parser = PossibleValuesParser::new(ALL.iter().map(|driver| driver.name)))]
     driver: String,
     /// Write the files here; those that are there already are not overwritten.

@@ -33,7 +33,6 @@ pub enum EnvironmentError {
     /// A folder or file of the cache.
     #[error("{}: {why}. XDG_CACHE_HOME names another folder for caches", path.display())]
     NotWritten {
-        /// Which.
         path: PathBuf,
         /// What the system says.
         why: String,

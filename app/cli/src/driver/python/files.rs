@@ -15,9 +15,7 @@ use handeye_workbench::settings;
 pub struct Shipped {
     /// Its subcommand of `handeye driver`.
     pub name: &'static str,
-    /// Its file.
     pub file: &'static str,
-    /// What is in it.
     pub source: &'static str,
 }
 

@@ -12,16 +12,13 @@ use handeye_workbench::tr;
 /// Height of the heads.
 pub const HEAD: f32 = 36.0;
 
-/// A column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
-    /// The image.
     Image,
     /// Number and pose.
     Name,
     /// Whether it is used.
     Use,
-    /// What it is for.
     Purpose,
     /// Residuals.
     Rms,
@@ -40,7 +37,6 @@ pub enum Column {
 /// Which column the rows are sorted by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sort {
-    /// The column.
     pub column: Column,
     /// Largest first.
     pub descending: bool,

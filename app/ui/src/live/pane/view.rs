@@ -19,11 +19,9 @@ const ZOOM_PER_POINT: f32 = 0.004;
 pub struct Image<'a> {
     /// Its pixels.
     pub texture: Option<&'a TextureHandle>,
-    /// Its name.
     pub name: &'static str,
     /// Everything.
     pub model: &'a Model,
-    /// What it is.
     pub shown: Shown<'a>,
     /// Whether corners and the like are drawn over it.
     pub with_overlays: bool,

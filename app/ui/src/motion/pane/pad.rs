@@ -19,7 +19,6 @@ const KEYS: [(Axis, Key, Key); 3] = [
     (Axis::Z, Key::PageDown, Key::PageUp),
 ];
 
-/// The pad.
 pub fn pad_ui(ui: &mut Ui, model: &Model, blocked: &Blocked, hold: &mut Hold) {
     let language = model.view.language;
     let frame = model.view.jog.frame;

@@ -92,7 +92,6 @@ pub fn printed(canvas: &mut Canvas, base_from_target: &Pose<Base, Target>, targe
 pub enum Line {
     /// In one go.
     Solid,
-    /// In dashes.
     Dashed,
 }
 

@@ -18,7 +18,6 @@ const LENGTH_M: f64 = 0.06;
 /// Where a capture is on the screen, to point at it.
 #[derive(Debug, Clone, Copy)]
 pub struct Spot {
-    /// Which.
     pub id: CaptureId,
     /// Where.
     pub at: Pos2,

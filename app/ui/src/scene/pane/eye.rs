@@ -30,7 +30,6 @@ pub struct Eye {
     focal: f64,
 }
 
-/// A point on the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScreenPoint {
     /// Where.

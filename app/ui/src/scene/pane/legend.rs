@@ -14,7 +14,6 @@ const INSET: f32 = 10.0;
 /// How something is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sign {
-    /// A line.
     Line,
     /// A line of dashes.
     Dashes,
@@ -31,9 +30,7 @@ pub enum Sign {
 pub struct Entry {
     /// How it is drawn.
     pub sign: Sign,
-    /// In which colour.
     pub colour: Color32,
-    /// What it is.
     pub name: String,
     /// The same at length, with units.
     pub what: String,

@@ -15,9 +15,7 @@ const KEEP_OUT_FILE: &str = "keep_out.toml";
 
 /// A dialog.
 pub struct Purpose {
-    /// Which.
     pub dialog: Dialog,
-    /// Its title.
     pub title: &'static str,
     /// What to do.
     pub hint: &'static str,

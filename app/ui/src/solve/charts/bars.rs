@@ -48,7 +48,6 @@ pub fn residuals_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &m
     }
 }
 
-/// Influence.
 pub fn influence_ui(ui: &mut Ui, model: &Model, table: &CaptureTable, outbox: &mut Outbox) {
     let language = model.view.language;
     let value = |row: &CaptureRow| row.influence_mm;

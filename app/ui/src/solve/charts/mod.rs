@@ -19,7 +19,6 @@ use handeye_workbench::tr;
 /// With so much room all charts are shown at once.
 const ROOM_FOR_ALL: Vec2 = Vec2::new(860.0, 520.0);
 
-/// A chart.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Chart {
     #[default]

@@ -34,7 +34,6 @@ enum Mark {
     Skipped(Text),
 }
 
-/// The row.
 pub fn row_ui(ui: &mut Ui, model: &Model, poses: &[&TaughtPose], index: usize, pose: &TaughtPose, outbox: &mut Outbox) {
     let language = model.view.language;
     let count = poses.len();

@@ -8,7 +8,6 @@ use handeye_workbench::tr;
 
 /// Reasons in the language of the window.
 pub struct Blocked {
-    /// For tracking.
     pub tracking: Option<&'static str>,
     /// For beginning to follow.
     pub follow: Option<&'static str>,

@@ -55,12 +55,10 @@ pub enum ArchiveTask {
     New {
         /// Where.
         folder: Option<PathBuf>,
-        /// With what.
         beginning: Box<Beginning>,
     },
     /// Go on with a session, or begin one with the images and poses of a data set.
     Open {
-        /// Which.
         folder: PathBuf,
         /// What its files may name.
         bounds: Bounds,
@@ -73,7 +71,6 @@ pub enum ArchiveTask {
     OpenOrNew {
         /// Where.
         folder: PathBuf,
-        /// With what.
         beginning: Box<Beginning>,
     },
     /// Go on with a complete copy in another folder.
@@ -88,7 +85,6 @@ pub enum ArchiveTask {
     Result {
         /// The session that it is of; another one that is open by now does not get it.
         folder: PathBuf,
-        /// The result.
         result: Box<CalibrationResult>,
     },
     /// Keep the record of guided capture beside the captures.

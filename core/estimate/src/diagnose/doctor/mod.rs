@@ -89,9 +89,9 @@ impl Hypothesis {
 /// A number that a hypothesis estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// What it is.
+    /// Name of the quantity, as the JSON has it.
     pub name: &'static str,
-    /// Its value.
+    /// The estimate, in `unit`.
     pub value: f64,
     /// One standard deviation; `None` where none is known.
     pub sigma: Option<f64>,

@@ -82,7 +82,7 @@ pub struct SessionViews {
     pub(crate) form_gradient: DVector<f64>,
     /// Degrees of freedom of how the views scatter, which the variances of a lens given and of a bend rest on.
     pub(crate) form_freedom: f64,
-    /// The target.
+    /// The target as the camera sees it.
     pub target: SeenTarget,
     /// `xiᵀ K xi` is the mean squared displacement of the target's points by a small motion `xi` of it, m².
     pub(crate) displacement: Matrix6<f64>,

@@ -121,7 +121,7 @@ pub enum Severity {
 /// What was found, by which evidence. As text it is a sentence or two with what to do.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What.
+    /// The kind of finding; part of the contract.
     pub code: FindingCode,
     /// How much it matters.
     pub severity: Severity,

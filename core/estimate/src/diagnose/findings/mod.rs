@@ -29,9 +29,9 @@ use crate::robot_accuracy::RobotAccuracy;
 /// One number that supports a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Evidence {
-    /// What it is.
+    /// Name of the number, as the JSON has it.
     pub name: &'static str,
-    /// Its value.
+    /// The number, in its unit.
     pub value: f64,
     /// Its unit; empty for a count or a ratio.
     pub unit: &'static str,

@@ -18,14 +18,14 @@ pub enum Numbers {
     Matrix(Matrix4<f64>),
 }
 
-/// The unit of lengths.
+/// The unit in which positions are written down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LengthUnit {
-    /// Metres.
+    /// 1 m.
     Metre,
-    /// Millimetres.
+    /// 0.001 m.
     Millimetre,
-    /// Centimetres.
+    /// 0.01 m.
     Centimetre,
 }
 
@@ -52,12 +52,12 @@ impl LengthUnit {
     }
 }
 
-/// The unit of angles.
+/// The unit in which angles are written down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum AngleUnit {
-    /// Radians.
+    /// 1 rad.
     Radian,
-    /// Degrees.
+    /// π/180 rad.
     Degree,
 }
 
@@ -274,11 +274,11 @@ impl fmt::Display for RotationForm {
 /// What the numbers of a series mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Reading {
-    /// Of lengths.
+    /// The unit of positions.
     pub length: LengthUnit,
     /// Of angles; says nothing where there are none.
     pub angle: AngleUnit,
-    /// Of rotations.
+    /// How rotations are written down.
     pub rotation: RotationForm,
 }
 

@@ -190,7 +190,7 @@ pub fn sort_by_misfit<T, K: Ord>(items: &mut [T], tie: f64, misfit: impl Fn(&T) 
 /// What is known of a hypothesis when it is compared with the others.
 #[derive(Debug, Clone, Copy)]
 pub struct Score {
-    /// Its misfit.
+    /// How far the target scatters over the views, over its distance from the camera.
     pub misfit: f64,
     /// Views that it was judged by.
     pub views: usize,

@@ -107,7 +107,7 @@ pub fn arm_parameters(joints: usize) -> Vec<ArmParameter> {
     angles.chain(of(&[LinkError::ShiftX, LinkError::ShiftY])).chain(of(&[LinkError::Compliance])).collect()
 }
 
-/// The errors of an arm.
+/// Errors of the joints and links of an arm, with the convention that makes them unique.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmErrors {
     joints: usize,

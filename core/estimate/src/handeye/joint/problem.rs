@@ -41,7 +41,7 @@ impl Free {
 /// What is known of free intrinsics beforehand.
 #[derive(Debug, Clone, Copy)]
 pub struct LensPrior<'a> {
-    /// The expected intrinsics.
+    /// The lens that is expected.
     pub expected: Intrinsics,
     /// Inverse of their covariance, in the order of [`Intrinsics::parameters`] and of their size; a direction of which
     /// nothing is known has none.

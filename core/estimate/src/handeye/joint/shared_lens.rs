@@ -162,9 +162,7 @@ pub fn difference(a: &Intrinsics, b: &Intrinsics) -> DVector<f64> {
 /// A fit of one session and what it says of its lens.
 #[derive(Debug, Clone)]
 pub struct Fitted<S> {
-    /// The fit.
     pub fit: S,
-    /// What it says.
     pub says: LensInformation,
 }
 

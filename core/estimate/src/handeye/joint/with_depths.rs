@@ -55,7 +55,6 @@ pub struct WithDepths {
 /// What a model that is less likely adds to what is not known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherModel {
-    /// Its probability.
     pub probability: f64,
     /// Its mean squares about the answer: its covariance, and its distance from the answer squared.
     squares: DMatrix<f64>,

@@ -82,7 +82,7 @@ impl Evidence {
 /// One comparison of what the data show with what the covariance promises.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
-    /// Which.
+    /// What was compared.
     pub by: Evidence,
     /// Variance shown over variance promised.
     pub ratio: f64,
