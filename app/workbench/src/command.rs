@@ -1,12 +1,12 @@
 //! What the user wants and what the workers report, as plain data that can be logged and replayed.
 //!
-//! Each feature says beside its code what may be wanted of it and what it reports; here is one list of the features for each.
+//! Each feature defines next to its code its commands and what it reports; this is one list of the features for each.
 
 use std::panic::Location;
 
 use serde::{Deserialize, Serialize};
 
-/// An enum with a variant for each feature, which the feature's own become by `From`.
+/// An enum with a variant for each feature; the feature's own enums convert to it with `From`.
 macro_rules! of_features {
     ($(#[$meta:meta])* enum $name:ident { $($variant:ident($feature:ident),)* } $($others:tt)*) => {
         $(#[$meta])*

@@ -1,10 +1,10 @@
-//! Photographs for whoever looks on: pages of the browser, viewers of Rerun.
+//! Photographs for viewers: pages of the browser, viewers of Rerun.
 
 pub use jpeg_encoder::{ColorType, EncodingError};
 use jpeg_encoder::{Encoder, SamplingFactor};
 
-/// A JPEG of these pixels, row by row. Colours have half the resolution of the light, as cameras keep them: that is half of the
-/// work, and what is measured is measured in the pixels themselves.
+/// A JPEG of these pixels, row by row. Chroma has half the resolution of luma, as cameras store it: that is half of the work,
+/// and what is measured is measured in the pixels themselves.
 ///
 /// # Errors
 /// An image without pixels, or with more than 65 535 in a row or column.
@@ -14,7 +14,7 @@ pub fn encoded(
     (width, height): (usize, usize),
     quality: u8,
 ) -> Result<Vec<u8>, EncodingError> {
-    // What is too large is refused by its length, which then is another one.
+    // What is too large is refused because its length then does not match.
     let side = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
     let mut bytes = Vec::with_capacity(pixels.len() / 16);
     let mut encoder = Encoder::new(&mut bytes, quality);

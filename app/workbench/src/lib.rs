@@ -1,7 +1,7 @@
 //! The workbench without a window: the model, what may change it, the threads that work for it.
 //!
-//! Data flows in one direction: workers report events, [`app::App`] changes the model, and whoever shows the model returns commands.
-//! Never depends on egui, a screen, Rerun, or a subcommand.
+//! Data flows in one direction: workers report events, [`app::App`] changes the model, and whatever shows the model returns
+//! commands. Never depends on egui, a screen, Rerun, or a subcommand.
 
 pub mod app;
 pub mod arguments;

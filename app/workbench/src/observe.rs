@@ -25,7 +25,7 @@ pub enum ObserveError {
     /// An image of a session could not be read.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The detector itself failed; a target that is not there is no failure.
+    /// The detector itself failed; a missing target is no failure.
     #[error("image {name:?}: {source}")]
     Vision {
         /// Which image.
@@ -60,16 +60,16 @@ pub enum ObserveError {
     Cancelled,
 }
 
-/// Part of the images with any grid in sight that must show the same one before it is taken for the target.
+/// Share of the images with any grid in sight that must show the same one before it is taken for the target.
 const SAME: f64 = 2.0 / 3.0;
 
 /// Images that must show it where none shows the target: what one or two show may be no board.
 const LEAST_OTHER: usize = 3;
-/// And so many times as many as show the target, where some do: a board that is there is found in more than a fifth of the images
-/// in which boards are.
+/// And this many times as many as show the target, if some do: a board that is present is found in more than a fifth of the
+/// images in which boards are.
 const TIMES_OTHER: usize = 4;
 
-/// Called with how many images of how many are done, from the threads that do the work.
+/// Called with the number of images that are done and their total, from the threads that do the work.
 pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// Loads every image of a data set and finds the target in it, on all cores.
@@ -80,7 +80,7 @@ pub fn observe(dataset: &Dataset, progress: Progress<'_>, cancel: &CancelToken) 
     if let Some(Err(why)) = dataset.arm.as_ref().map(|arm| &arm.placement) {
         tracing::warn!("the joint angles are not used: {why}");
     }
-    // A corner table says what was found in each image.
+    // A corner table lists what was found in each image.
     let image_of = |index: usize| -> Result<Option<GrayImage>, ObserveError> {
         let entry = &dataset.entries[index];
         let given = entry.corners.is_some() || entry.image_path.is_none();
@@ -116,7 +116,8 @@ pub fn observe_session(
     Ok(session.document.observations(image_size, |id| sights.get(&id).cloned()))
 }
 
-/// The plane of the target by the depths of a capture. A depth image that cannot be read is as none: corners are enough for an answer.
+/// The plane of the target by the depths of a capture. A depth image that cannot be read is treated as missing: corners are enough
+/// for an answer.
 pub fn depth_plane(
     folder: &Path,
     capture: &CaptureRecord,
@@ -155,7 +156,7 @@ pub(crate) fn chessboards_in_sight(
     progress: Progress<'_>,
     cancel: &CancelToken,
 ) -> Result<BTreeMap<(usize, usize), usize>, ObserveError> {
-    // What is looked for says only how small squares may be.
+    // The target that is looked for only gives how small squares may be.
     const USUAL: Grid = Grid { columns: 9, rows: 6, square_m: 0.02 };
     let look = |index: usize| {
         let Ok(image) = handeye_images::load_gray(&images[index]) else { return Ok(None) };
@@ -239,7 +240,7 @@ impl Look {
     }
 }
 
-/// Whether the images show a chessboard of another size, always the same, and the one looked for never, or seldom: where the
+/// Whether the images show a chessboard of another size, always the same, and the expected one never or seldom: where the
 /// border of an image hides a column, a board with one column more looks like it.
 fn other_chessboard(looks: &[Look], grid: &Grid) -> Result<(), ObserveError> {
     let found = looks.iter().filter(|look| matches!(look, Look::Found(_))).count();

@@ -1,10 +1,10 @@
-//! The recorded sample that comes with the program (assets/samples/README.md), in the program itself: it is there wherever the
-//! binary is.
+//! The recorded sample that comes with the program (assets/samples/README.md), embedded in the binary, so that it is always
+//! available.
 
 use std::path::Path;
 use std::{fs, io};
 
-/// What the session is called that the sample becomes.
+/// Name of the session that is made from the sample.
 pub const NAME: &str = "sample";
 
 macro_rules! files {

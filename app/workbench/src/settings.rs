@@ -1,4 +1,4 @@
-//! What the program remembers of the user's wishes: a TOML file that people may edit.
+//! The user's settings that the program remembers: a TOML file that can be edited.
 //!
 //! A value is taken from the first of these that has it: the command line, the environment (`HANDEYE_…`), the file
 //! (`$XDG_CONFIG_HOME/handeye-workbench/settings.toml`, or below `~/.config`), the defaults. The file is written only when
@@ -33,7 +33,7 @@ pub struct Settings {
     rotation: RotationFormat,
     depth_scale: DepthScale,
     depth_colours: ColourMap,
-    /// Which cell to work with at the start; empty is the built-in one.
+    /// Which cell to work with at the start; empty for the built-in one.
     connect: String,
     /// Scene of the built-in cell: a name, or a file; empty is the reference scene.
     scene: String,
@@ -47,7 +47,7 @@ pub struct Settings {
     pub objects: CellPaths,
 }
 
-/// The language of the window, as it is wished.
+/// The language of the window, as configured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 enum LanguageChoice {
     #[default]
@@ -79,7 +79,7 @@ impl From<Language> for LanguageChoice {
     }
 }
 
-/// Something in the settings that was left out, and where.
+/// A setting that was ignored, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning(pub Text);
 
@@ -90,12 +90,12 @@ impl From<Warning> for messages::Event {
 }
 
 impl Settings {
-    /// As TOML has them.
+    /// As a TOML table.
     fn table(&self) -> toml::Table {
         toml::Table::try_from(self).expect("words and lists of words can be written as TOML")
     }
 
-    /// Sets one key. The others stay as they are when it cannot have that value.
+    /// Sets one key. The others are unchanged if the value is invalid.
     fn set(&mut self, key: &str, value: toml::Value) -> Result<(), toml::de::Error> {
         let mut table = self.table();
         table.insert(key.to_owned(), value);
@@ -105,7 +105,7 @@ impl Settings {
         Ok(())
     }
 
-    /// Takes in a file. What cannot be used is left as it was and told.
+    /// Takes in a file. What cannot be used is left as it was and reported.
     pub(crate) fn read(&mut self, file: &str, content: &str) -> Vec<Warning> {
         let (table, errors) = DeTable::parse_recoverable(content);
         let mut warnings: Vec<_> = errors
@@ -133,7 +133,7 @@ impl Settings {
     /// Takes in the environment, given as a function that looks a variable up.
     pub(crate) fn read_environment(&mut self, variable: impl Fn(&str) -> Option<String>) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        // A list cannot stand in a variable.
+        // A list cannot be given in a variable.
         for (key, _) in self.table().into_iter().filter(|(_, value)| value.is_str()) {
             let name = format!("HANDEYE_{}", key.to_uppercase());
             if let Some(value) = variable(&name)
@@ -145,7 +145,7 @@ impl Settings {
         warnings
     }
 
-    /// How the window looks at the start; what is not kept here has its default.
+    /// How the window looks at the start; what is not stored here has its default.
     pub fn view(&self) -> ViewSettings {
         let Self { theme, language, rotation, depth_scale, depth_colours, .. } = *self;
         let language = language.language();
@@ -170,7 +170,7 @@ impl Settings {
         home.unwrap_or_default().join("handeye-sessions")
     }
 
-    /// The file that says this.
+    /// The file with this content.
     fn written(&self) -> String {
         let table = self.table();
         format!(
@@ -183,16 +183,16 @@ fn line_of(content: &str, at: usize) -> usize {
     content.bytes().take(at).filter(|&byte| byte == b'\n').count() + 1
 }
 
-/// Where the system has the file; `None` without a home.
+/// Default place of the file; `None` without a home folder.
 pub fn default_path() -> Option<PathBuf> {
     Some(BaseDirs::new()?.config_dir().join(FOLDER).join("settings.toml"))
 }
 
-/// The file, what it says, and what the user has changed since.
+/// The file, its content, and what the user has changed since.
 #[derive(Debug, Default)]
 pub struct SettingsFile {
     path: Option<PathBuf>,
-    /// What the file says, without command line and environment.
+    /// The content of the file, without command line and environment.
     in_file: Settings,
     /// How the window looked when it was last compared.
     last_view: ViewSettings,
@@ -225,7 +225,7 @@ impl SettingsFile {
         self
     }
 
-    /// What is to be written when the user has changed how the window looks or where the scene has its objects, or an
+    /// What has to be written when the user has changed how the window looks or where the scene has its objects, or an
     /// address or a driver is new; a worker does it.
     pub fn keep(
         &mut self,
@@ -242,7 +242,7 @@ impl SettingsFile {
             return None;
         }
         let before_text = self.in_file.written();
-        // What the environment says and the user did not touch stays out of the file.
+        // What the environment sets and the user did not change stays out of the file.
         let ViewSettings { theme, language, rotation, depth_scale, depth_colours, .. } = view;
         let (before, kept) = (self.last_view, &mut self.in_file);
         keep(&mut kept.theme, before.theme, theme);
@@ -263,7 +263,7 @@ impl SettingsFile {
     }
 }
 
-/// A settings file, or what is remembered beside it, that is to be written.
+/// A settings file, or what is remembered next to it, that has to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SettingsWrite {
     path: PathBuf,
@@ -279,7 +279,7 @@ impl SettingsWrite {
     /// Writes it, as a whole or not at all.
     ///
     /// # Errors
-    /// When it cannot be written; it is not tried again before the next change.
+    /// When it cannot be written; it is not retried before the next change.
     pub fn perform(&self) -> Result<(), Warning> {
         let write = || {
             if let Some(folder) = self.path.parent() {

@@ -1,7 +1,7 @@
-//! Words that the window shows, in the language of the user.
+//! Texts that the window shows, in the language of the user.
 //!
 //! The English sentence is the key. `tr!(language, "Capture")` gives a fixed text at once; `text!` makes a [`Text`] that is
-//! said later. Translations stand in `assets/text/<language>/*.toml` as `"English" = "translation"`; a test reads the
+//! shown later. Translations are in `assets/text/<language>/*.toml` as `"English" = "translation"`; a test reads the
 //! sources, those of the core too, and fails for a text that has none.
 
 use std::collections::BTreeMap;
@@ -26,13 +26,13 @@ impl Language {
     /// All of them, in the order of menus.
     pub const ALL: [Self; 2] = [Self::English, Self::Chinese];
 
-    /// That of the window for a locale of the system, such as `zh_CN.UTF-8`: English where there is none of its language.
+    /// The language of the window for a locale of the system, such as `zh_CN.UTF-8`: English if it has no translation.
     pub(crate) fn of_locale(locale: &str) -> Self {
         let language = locale.split(['-', '_', '.', '@']).next().unwrap_or_default();
         if language.eq_ignore_ascii_case("zh") { Self::Chinese } else { Self::English }
     }
 
-    /// Its name in itself.
+    /// Its name in the language itself.
     pub fn own_name(self) -> &'static str {
         match self {
             Self::English => "English",

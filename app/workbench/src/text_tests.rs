@@ -87,7 +87,7 @@ fn has_words(text: &str) -> bool {
     std::iter::once(first).chain(after).any(|words| words.contains(char::is_alphabetic))
 }
 
-/// The messages of errors that reach the window, with the places where they stand.
+/// The messages of errors that reach the window, with the places where they are defined.
 fn errors() -> BTreeMap<String, PathBuf> {
     let mut errors = BTreeMap::new();
     for (file, source) in all_sources().into_iter().filter(|(_, source)| source.contains("Localized)]")) {
@@ -133,7 +133,7 @@ fn what_an_error_misses_or_wants_is_there_in_chinese() {
     assert!(missing.is_empty(), "no translation for the phrases\n{}", missing.join("\n"));
 }
 
-/// Every text in the sources with the places where it stands.
+/// Every text in the sources with the places where it is used.
 fn texts() -> BTreeMap<String, PathBuf> {
     let mut texts = errors();
     for (file, source) in all_sources() {
@@ -184,7 +184,7 @@ fn no_error_of_ours_is_passed_on_in_english() {
         if path.contains("/cli/") || path.contains("tests") {
             continue;
         }
-        // What a person reads is a sentence of the catalogue, in which the words of a library are a value.
+        // What the user reads is a sentence of the catalogue, in which the words of a library are a value.
         for (at, _) in source.match_indices("verbatim(") {
             let rest = source[at..].split([';', '\n']).next().unwrap_or_default();
             if rest.contains(".to_string()") {
@@ -226,7 +226,7 @@ fn every_catalogue_can_be_read_and_no_text_is_there_twice() {
     }
 }
 
-/// What a README has whatever its language: levels of headings, lines of code without their comments, documents it names.
+/// What a README contains in any language: levels of headings, lines of code without their comments, documents it names.
 fn skeleton(readme: &str) -> (Vec<usize>, Vec<String>, BTreeSet<&str>) {
     let (mut headings, mut code, mut is_code) = (Vec::new(), Vec::new(), false);
     for line in readme.lines() {

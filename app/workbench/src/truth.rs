@@ -1,4 +1,4 @@
-//! A result beside the truth that a simulated cell publishes. Reports only: nothing here reaches a solver.
+//! A result compared with the truth that a simulated cell publishes. Reports only: nothing here reaches a solver.
 
 use handeye_estimate::handeye::HandEye;
 use handeye_geometry::camera::Intrinsics;

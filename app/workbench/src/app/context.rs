@@ -5,17 +5,17 @@ use crate::model::{JobId, Model, MotionId};
 use crate::solve::question::Question;
 use crate::worker::{Clock, SessionThreads, Waker, Workers};
 
-/// The model and those that work for it. A handler takes of it what it needs, so that its signature says what it can change
-/// and whom it can ask; it takes all of it where it has other features go on.
+/// The model and what works for it. A handler takes only the parts that it needs, so that its signature shows what it can
+/// change and whom it can ask; it takes all of it where it lets other features continue.
 pub(crate) struct Context {
     pub(crate) model: Model,
-    /// The threads that talk to the cell; others take their place when another cell is chosen.
+    /// The threads that talk to the cell; they are replaced when another cell is chosen.
     pub(crate) workers: Workers,
     pub(crate) desk: SessionThreads,
     pub(crate) numbers: Numbers,
 }
 
-/// What a connection is begun with.
+/// What a connection is started with.
 pub(crate) struct Connector {
     pub(crate) connect: Connect,
     pub(crate) clock: Clock,
@@ -23,7 +23,7 @@ pub(crate) struct Connector {
     pub(crate) waker: Waker,
 }
 
-/// What was asked for last, by which late answers are told apart.
+/// Numbers of the newest requests, used to recognize late answers.
 #[derive(Debug, Default)]
 pub(crate) struct Numbers {
     pub(crate) capture: u64,
@@ -31,9 +31,9 @@ pub(crate) struct Numbers {
     pub(crate) motion: MotionId,
     /// The motion that follows the board.
     pub(crate) follow: Option<MotionId>,
-    /// The request for poses to verify at that is not answered yet.
+    /// The request for verification poses that is not answered yet.
     pub(crate) plan: Option<MotionId>,
-    /// The request for a view for a person to bring about.
+    /// The request for a view that the user should bring about.
     pub(crate) view: u64,
     /// The request about a recording.
     pub(crate) import: u64,

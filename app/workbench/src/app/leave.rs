@@ -1,17 +1,17 @@
 //! The end of the application, whether its window is closed or the system asks for it by a signal.
 //!
-//! What moves the arm is braked first, then threads and connections end. What was captured is on the disk already; what
-//! was handed in is still written.
+//! What moves the arm is braked first, then threads and connections end. What was captured is on the disk already;
+//! pending writes are still finished.
 
 use std::time::{Duration, Instant};
 
 use super::App;
 use crate::keep_out::update::keep_keep_out;
 
-/// How long all of it may take. The system gives a program that it asks to end a few seconds, a person less.
+/// How long all of it may take. The system gives a program that it asks to end a few seconds, a user less.
 const ALL: Duration = Duration::from_millis(1500);
 
-/// What is left of that for threads when the arm does not come to rest before.
+/// What is left of that for threads when the arm does not come to rest earlier.
 const FOR_THREADS: Duration = Duration::from_millis(500);
 
 /// What is left for the session and for what was recorded for Rerun when a worker hangs.
@@ -19,7 +19,7 @@ const FOR_FILES: Duration = Duration::from_millis(300);
 
 impl App {
     /// Begins to leave: the arm is braked if this application moves it, a solve ends. The rest happens when the application
-    /// is dropped, which is to be soon.
+    /// is dropped, which should be soon.
     pub fn begin_to_leave(&mut self) {
         if self.leave_by.is_some() {
             return;
@@ -27,7 +27,7 @@ impl App {
         self.leave_by = Some(Instant::now() + ALL);
         self.cx.model.sequence_runs = false;
         keep_keep_out(&mut self.cx.model, &self.cx.desk, true);
-        // Another client's motions are none of our business.
+        // Another client's motions are not ours to stop.
         if self.cx.workers.is_moving() {
             self.cx.workers.press_stop();
         }

@@ -1,8 +1,8 @@
 //! The application without its window: the model, the workers, and the only two ways to change the model.
 //!
-//! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each hands on to the feature that it
-//! concerns, whose `update` changes the model and hands work to threads; what it is given here is all that it can reach. None
-//! waits.
+//! [`App::apply`] does what the user wants, [`App::absorb`] takes in what happened. Each passes it on to the feature
+//! concerned, whose `update` changes the model and passes work to threads; a feature can reach only what it is given here.
+//! None of them waits.
 
 mod context;
 mod leave;
@@ -40,7 +40,7 @@ pub(crate) use reach::bounds_of;
 /// Makes what connects to a cell.
 pub type Connect = Arc<dyn Fn(&CellSource, &CellPaths) -> Arc<dyn Cell> + Send + Sync>;
 
-/// What an application begins with.
+/// What an application starts with.
 pub struct Start {
     pub source: CellSource,
     /// What is remembered from one start to the next.
@@ -55,7 +55,7 @@ pub struct Start {
     pub keep_out: Option<PathBuf>,
     /// Where new sessions go.
     pub sessions: PathBuf,
-    /// A session or data set to open at once; where there is none, a session is begun there.
+    /// A session or data set to open at once; if it does not exist, a session is started there.
     pub open: Option<PathBuf>,
     /// What can be reached where the window is shown in browsers; nothing is then opened on the screen of this machine.
     pub in_browser: Option<InBrowser>,
@@ -74,12 +74,12 @@ pub struct InBrowser {
 pub struct App {
     pub(crate) cx: Context,
     connector: Connector,
-    /// Nothing is recorded without.
+    /// Nothing is recorded without it.
     recording: Option<Box<dyn Recording>>,
     recorded: Recorded,
-    /// Until when everything has to be over, once the application ends.
+    /// Deadline for everything to end, once the application ends.
     leave_by: Option<Instant>,
-    /// Stops of other threads that were taken note of.
+    /// Stops from other threads that were already handled.
     outside_stops: u64,
     /// What commands may reach, if not everything.
     reach: Option<Reach>,
@@ -89,7 +89,7 @@ impl App {
     /// Starts the workers; they connect by themselves.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system cannot start more threads.
     pub fn start(start: Start, connect: Connect, clock: Clock, waker: Waker) -> io::Result<Self> {
         let Start { source, view, addresses, drivers, objects, keep_out, sessions, open, in_browser } = start;
         let desk = SessionThreads::start(sessions, &clock, &waker)?;
@@ -133,13 +133,13 @@ impl App {
         &self.connector.waker
     }
 
-    /// Goes on from a model that a test has made up. The workers do not hear of it.
+    /// Continues from a model that a test has made up. The workers are not notified.
     #[cfg(feature = "testing")]
     pub fn replace_model(&mut self, model: Model) {
         self.cx.model = model;
     }
 
-    /// Has everything recorded from here on; without it nothing is.
+    /// Records everything from here on; without it nothing is recorded.
     pub fn record_into(&mut self, recording: impl Recording + 'static) {
         self.recording = Some(Box::new(recording));
     }
@@ -162,8 +162,8 @@ impl App {
         }
     }
 
-    /// Takes note of stops that other threads have pressed. Nothing that moves begins before: a sequence would go on with
-    /// its next pose.
+    /// Takes note of stops that other threads have pressed. Nothing that moves begins before that: a sequence would
+    /// continue with its next pose.
     fn take_outside_stops(&mut self) {
         let pressed = self.stop_line().outside();
         if std::mem::replace(&mut self.outside_stops, pressed) < pressed {
@@ -171,13 +171,13 @@ impl App {
         }
     }
 
-    /// What is asked for from now on was asked for after so many stops of other threads.
+    /// What is requested from now on was requested after this many stops of other threads.
     pub fn note_stops(&mut self, pressed: u64) {
         self.take_outside_stops();
         self.stop_line().note(pressed);
     }
 
-    /// What stops the arm, for other threads.
+    /// The stop for the arm, for use by other threads.
     pub fn stop_line(&self) -> &Arc<StopLine> {
         self.cx.workers.stop_line()
     }

@@ -1,4 +1,4 @@
-//! What moves the arm, and what has to be asked first.
+//! What moves the arm, and what the user has to confirm first.
 
 use handeye_cell::scene::{SceneChoice, ShippedScene};
 use handeye_dataset::taught_poses::{Goal, TaughtPose};
@@ -79,7 +79,7 @@ fn the_first_move_of_a_sequence_is_asked_for_wherever_there_may_be_a_real_arm() 
     let mut bench = bench(&FakeCell::new(0));
     let app = &mut bench.app;
     app.replace_model(taught_at(driver()));
-    // Whoever switched this off did so for moves that were seen before.
+    // Whoever switched this off did so for moves that were previewed.
     app.apply(motion::Command::SetConfirmMoves(false));
     app.apply(taught::Command::RunSequence { purpose: None });
     let asked = app.model().asked.clone().expect("the first move waits");
@@ -169,7 +169,7 @@ fn another_cell_has_no_move_that_waits_and_another_home() {
     assert_eq!((&app.model().asked, app.model().home), (&None, None));
 }
 
-/// A driver that says `done` to `stop` and goes on: what the states say counts.
+/// A driver that replies `done` to `stop` and keeps moving: the reported states count.
 #[test]
 fn an_arm_is_said_to_be_stopped_when_its_states_say_so_and_an_alarm_has_the_number_otherwise() {
     for goes_on in [false, true] {

@@ -1,4 +1,4 @@
-//! What can be reached from a browser: whoever sits there need not be who started the program.
+//! What can be reached from a browser: its user need not be the one who started the program.
 
 use std::path::{Path, PathBuf};
 
@@ -14,24 +14,24 @@ use handeye_wording::text;
 #[derive(Debug, Clone, Default)]
 pub struct Reach {
     folders: Vec<Bounds>,
-    /// In which every folder is an upload of somebody.
+    /// Each folder in it is one user's upload.
     uploads: Option<PathBuf>,
     drivers: Vec<Drivers>,
 }
 
 impl Reach {
-    /// These folders with all that is in them.
+    /// These folders with everything in them.
     pub fn new(folders: impl IntoIterator<Item = PathBuf>) -> Self {
         Self { folders: folders.into_iter().map(|folder| Bounds::within(&folder)).collect(), ..Self::default() }
     }
 
-    /// With a folder of which every folder is an upload: whoever uploads says nothing of what else is here.
+    /// With a folder that holds one folder per upload: an uploader learns nothing about what else is here.
     #[must_use]
     pub fn with_uploads(self, folder: PathBuf) -> Self {
         Self { uploads: Some(folder), ..self }
     }
 
-    /// Drivers that may be started: those that somebody at this machine has started before.
+    /// Drivers that may be started: those that a user at this machine has started before.
     #[must_use]
     pub fn with_drivers(self, drivers: Vec<Drivers>) -> Self {
         Self { drivers, ..self }
@@ -42,7 +42,8 @@ impl Reach {
         self.folders.iter().any(|folder| folder.has(path))
     }
 
-    /// What files in a folder may name: an upload what is in the upload, another one what is in the folder that browsers reach.
+    /// What files in a folder may refer to: in an upload, only files of the upload; elsewhere, files of the folder that
+    /// browsers reach.
     pub(crate) fn bounds_of(&self, path: &Path) -> Bounds {
         let upload = self.uploads.as_ref().and_then(|uploads| {
             let own = path.strip_prefix(uploads).ok()?.components().next()?;
@@ -90,7 +91,7 @@ impl Reach {
     }
 }
 
-/// What files in a folder that is opened may name: anything, where somebody sits at this machine.
+/// What files in a folder that is opened may refer to: anything, if the user is at this machine.
 pub(crate) fn bounds_of(reach: Option<&Reach>, path: &Path) -> Bounds {
     reach.map_or(Bounds::ANYWHERE, |reach| reach.bounds_of(path))
 }

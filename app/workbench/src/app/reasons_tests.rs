@@ -1,4 +1,4 @@
-//! Why something did not come about has to stand where the person looks who asked for it, and in the log.
+//! The reason why something failed has to be shown where the user who asked for it looks, and in the log.
 
 use super::tests::{bench, choose, waits};
 use super::*;
@@ -13,7 +13,7 @@ use handeye_plan::guided::Ending;
 
 const MANUAL: &str = "The robot refuses: the pendant is in manual mode";
 
-/// What stands in a pane, which is in the log as well.
+/// What is shown in a pane, which is in the log as well.
 fn standing(app: &App, pane: Pane) -> String {
     app.model()
         .messages

@@ -62,7 +62,7 @@ pub(super) fn reported(app: &App) -> String {
     app.model().messages.newest().map_or_else(String::new, |message| message.text.in_language(Language::English))
 }
 
-/// Collects what the threads report until the model is like that.
+/// Collects what the threads report until the condition holds for the model.
 fn until(app: &mut App, is_so: impl Fn(&Model) -> bool) {
     let deadline = Instant::now() + Duration::from_mins(1);
     while !is_so(app.model()) {
@@ -72,8 +72,8 @@ fn until(app: &mut App, is_so: impl Fn(&Model) -> bool) {
     }
 }
 
-/// A scene is read when a connection is made, so another scene takes another connection; the built-in cell has one scene, and
-/// a new connection would be a new cell.
+/// A scene is read when a connection is made, so another scene needs a new connection; the built-in cell has one scene, and a
+/// new connection would be a new cell.
 #[test]
 fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_address_alone() {
     let made: Arc<std::sync::Mutex<Vec<(CellSource, CellPaths)>>> = Arc::default();
@@ -100,7 +100,7 @@ fn objects_of_another_scene_and_connect_again_make_a_new_connection_to_an_addres
     assert_eq!(made, [(address.clone(), panda), (address.clone(), xarm.clone()), (address, xarm)]);
 }
 
-/// Captures of two cells do not calibrate together, and nothing in a session says which cell it is of.
+/// Captures of two cells cannot be calibrated together, and a session does not record which cell it belongs to.
 #[test]
 fn who_connects_to_another_cell_with_captures_at_hand_is_told_of_a_new_session() {
     let mut bench = bench(&FakeCell::new(0));
@@ -284,7 +284,7 @@ fn a_pause_breaks_a_sequence_off_and_it_is_continued_with_the_pose_that_has_no_c
     assert!(!bench.app.model().sequence_runs, "its poses are those of another session");
 }
 
-/// The pose that is next is chosen as a worker chooses it.
+/// Chooses the next pose as a worker does.
 pub(super) fn choose(app: &mut App) {
     let id = app.cx.numbers.motion;
     let guided = app.cx.model.sequence.as_mut().and_then(|it| it.guided.as_deref_mut()).expect("a guided sequence");
@@ -345,7 +345,7 @@ fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
     app.replace_model(sample::solved());
     let judged_over = |app: &mut App| {
         app.apply(guided::Command::CalibrateForMe);
-        // The answer that there is stands for the one from the present method.
+        // The present answer stands in for one from the present method.
         app.cx.model.solve.status = SolveStatus::Idle;
         app.cx.model.solve.fresh = true;
         guided_step(&mut app.cx.model, &app.cx.workers, &mut app.cx.numbers);
@@ -360,7 +360,7 @@ fn the_goal_is_judged_over_the_box_that_was_chosen_for_the_expected_error() {
     assert_eq!((low.coords.as_slice(), high.coords.as_slice()), (&[0.3, 0.0, 0.0][..], &[0.5, 0.2, 0.1][..]));
 }
 
-/// The way was checked from where the arm was.
+/// The path was checked from where the arm was.
 #[test]
 fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     let mut bench = bench(&FakeCell::new(0));
@@ -377,7 +377,7 @@ fn an_arm_that_was_moved_meanwhile_does_not_go_where_it_was_let() {
     app.apply(motion::Command::ConfirmMove);
     assert_eq!(app.model().motion, Motion::Idle);
     assert!(reported(app).contains("elsewhere"), "{}", reported(app));
-    // Without confirmation the one that waits begins at once.
+    // Without confirmation the waiting one starts at once.
     choose(app);
     app.apply(motion::Command::SetConfirmMoves(false));
     assert!(matches!(app.model().motion, Motion::Moving { .. }));
@@ -400,7 +400,7 @@ fn a_pose_that_was_chosen_by_a_chain_that_does_not_fit_any_more_is_not_driven_to
     assert_eq!(app.model().motion, Motion::Idle);
 }
 
-/// A person is led, with a view that is wanted.
+/// The user is guided, with a view that is wanted.
 fn led(ending: Option<Ending>) -> Model {
     let mut model = sample::solved();
     let hand = ByHand { ending, ..ByHand::new(GuidedOptions::default(), HandWaits::View, 0.0) };
@@ -438,7 +438,7 @@ fn only_a_capture_for_verification_checks_an_answer_by_hand() {
     assert_eq!(checked(&bench.app), Some(1));
 }
 
-/// A view that is wanted, and a detection in which the board looks so.
+/// A view that is wanted, and a detection in which the board looks like it.
 fn wanted_and_seen(app: &App) -> (Box<Wanted>, LiveDetection) {
     let document = Arc::clone(&app.cx.model.session.document);
     let observations = seen(&app.cx.model, &document).observations;
@@ -458,7 +458,7 @@ fn wanted_and_seen(app: &App) -> (Box<Wanted>, LiveDetection) {
     (wanted, LiveDetection { corners: Some(corners), ..detection })
 }
 
-/// Nothing else would change there, and a person would read "hold still" for ever.
+/// Nothing else would change there, and the user would read "hold still" for ever.
 #[test]
 fn where_a_capture_by_hand_was_refused_it_is_not_tried_again() {
     let mut bench = bench(&FakeCell::new(0));
@@ -618,7 +618,7 @@ fn the_view_in_3d_is_fitted_to_every_cell_once_and_then_left_as_a_person_turned_
 
 #[test]
 fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
-    // The cell says nothing by itself.
+    // The cell reports nothing by itself.
     let (cell, release) = FakeCell::that_never_answers();
     let mut bench = bench(&cell);
     let folder = bench.sessions.path().join("named");
@@ -634,7 +634,7 @@ fn a_session_that_was_named_at_the_start_takes_on_the_cell_that_connects() {
         assert!(arm.is_some());
         bench.app.absorb(connect::Event::Cell(Box::new(facts)));
         until(&mut bench.app, |model| model.document().meta.arm == arm);
-        // An arm that may still turn out to be known takes nothing away; what is asked for later is done later.
+        // An arm that may still turn out to be known disables nothing; what is requested later is done later.
         bench.app.absorb(connect::Event::Cell(Box::new(undecided.clone())));
         for mode in [Mode::EyeInHand, Mode::EyeToHand] {
             bench.app.apply(session::Command::SetMode(mode));

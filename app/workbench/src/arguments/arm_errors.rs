@@ -13,7 +13,7 @@ pub enum ArmErrorsChoice {
     None,
 }
 
-// Derived, it would say of each value what it means, and then the help of all options is set otherwise.
+// Derived, it would describe each value, which changes the layout of the help of all options.
 impl ValueEnum for ArmErrorsChoice {
     fn value_variants<'a>() -> &'a [Self] {
         &[Self::Nominal, Self::None]

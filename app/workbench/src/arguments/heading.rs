@@ -1,4 +1,4 @@
-//! Headings that the help lists options under. An option has the same one in every command.
+//! Headings under which the help lists options. An option has the same one in every command.
 #![expect(missing_docs, reason = "each says what it is")]
 
 pub const ACCESS: &str = "Access";

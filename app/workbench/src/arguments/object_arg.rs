@@ -19,7 +19,7 @@ fn assignment(text: &str) -> Result<String, BadCellPath> {
 }
 
 impl ObjectArgs {
-    /// What is given, and the others as they were.
+    /// The given paths; the others from `otherwise`.
     pub fn paths(&self, otherwise: CellPaths) -> CellPaths {
         let mut paths = otherwise;
         for text in &self.objects {

@@ -43,12 +43,12 @@ pub struct DescribedTarget {
     /// Family of tags [default: apriltag_36h11].
     #[arg(long, value_name = "NAME", help_heading = heading::TAGS)]
     family: Option<Dictionary>,
-    /// Width of the black border of tags in bits [default: 2 on boards, as Kalibr has it, 1 for a single tag].
+    /// Width of the black border of tags in bits [default: 2 on boards, as in Kalibr, 1 for a single tag].
     #[arg(long, value_name = "N", help_heading = heading::TAGS)]
     border_bits: Option<usize>,
 }
 
-/// Kinds of targets, as data sets call them.
+/// Kinds of targets, as named in data sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 enum Kind {
@@ -95,13 +95,13 @@ pub fn of_text(text: &str) -> anyhow::Result<TargetSpec> {
         .map_err(|e| anyhow!("--target {text}: {}", e.to_string().lines().next().unwrap_or_default()))?;
     let is_open = parsed.target.layout.is_none();
     Ok(match parsed.target.spec()? {
-        // A board that is printed has today's layout where nobody says another; of one in images these tell.
+        // A board that is printed has today's layout unless another is given; for one in images, the images decide.
         TargetSpec::Charuco(board) if is_open => TargetSpec::Charuco(Charuco { layout: None, ..board }),
         target => target,
     })
 }
 
-/// To read a described target by itself.
+/// Parses a described target on its own.
 #[derive(Debug, Parser)]
 struct TextTarget {
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! A calibration that a person is guided through.
+//! A calibration with guidance by hand.
 
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_plan::guided::by_hand::{HandGuide, HandNext, Judged, Wanted};
@@ -14,7 +14,7 @@ pub struct ByHand {
     pub wanted: Option<Box<Wanted>>,
     /// How the view in the newest image compares with it; `None` while the board is not seen.
     pub judged: Option<Judged>,
-    /// Since when \[s\], and where, the robot stands in a view that is good enough.
+    /// Since when \[s\], and where, the robot is at rest in a view that is good enough.
     pub rests: Option<(f64, Pose<Base, Tip>)>,
     /// Where a capture was refused: it is not tried there again.
     pub refused_at: Option<Pose<Base, Tip>>,
@@ -34,7 +34,7 @@ pub enum HandWaits {
     Answer,
     /// For the choice of a view.
     Choice,
-    /// For the person to bring the view about.
+    /// For the user to bring the view about.
     View,
     Capture,
 }
@@ -62,6 +62,6 @@ impl ByHand {
 pub struct HandChoice {
     /// What chose, with what it proposed.
     pub guide: HandGuide,
-    /// What comes next; `None` where the board of the first view has no pose, or no check is in sight.
+    /// What comes next; `None` where the board of the first view has no pose, or no verification view is found.
     pub next: Option<HandNext>,
 }

@@ -1,4 +1,4 @@
-//! How a calibration goes on that a person is guided through.
+//! How a calibration with guidance by hand continues.
 
 use std::sync::Arc;
 
@@ -19,9 +19,9 @@ use crate::text::Text;
 use crate::worker::{SessionThreads, Workers};
 use handeye_wording::text;
 
-/// How long a robot has to stand in a good view before the capture begins \[s\]: a hand that passes by does not.
+/// How long a robot has to rest in a good view before the capture begins \[s\]: a hand that moves past does not.
 const REST_S: f64 = 0.4;
-/// Views that are asked for to check the answer, at the most: whether the robot gets there is not known, so many are skipped.
+/// Views that are requested to check the answer, at most: whether the robot gets there is not known, so many are skipped.
 const MOST_CHECK_VIEWS: usize = 30;
 /// How far it may move meanwhile [m, rad]. The capture itself waits until robot and image have settled.
 const RESTS_WITHIN: (f64, f64) = (2e-3, 0.01);
@@ -44,14 +44,15 @@ pub(crate) fn absorb(model: &mut Model, numbers: &Numbers, event: Event) {
     view_chosen(model, numbers, number, *choice);
 }
 
-/// Guides a person from the board in view to the goal. Captures that there are count; without any the first is taken here.
+/// Guides the user from the board in view to the goal. Existing captures count; if there are none, the first is taken
+/// here.
 fn guide_by_hand(cx: &mut Context) {
     if cx.model.sequence_runs || cx.model.planning || cx.model.by_hand.is_some() {
         return;
     }
     let views = cx.model.document().in_use().filter(|it| corners(&cx.model, it.id).is_some()).count();
     let options = options(cx.model.view.goal.0, views);
-    // What a view adds is known of the joint estimate alone.
+    // What a view adds is only known for the joint estimate.
     set_method(&mut cx.model, &mut cx.desk, &mut cx.numbers, Method::Joint.name());
     cx.model.messages.is_over_in(Pane::Poses);
     let waits = if views > 0 { HandWaits::Answer } else { HandWaits::Capture };
@@ -68,7 +69,7 @@ fn stop_guiding(model: &mut Model) {
     }
 }
 
-/// A person leaves out the view that is wanted.
+/// The user skips the wanted view.
 fn skip_view(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
     let Some(hand) = model.by_hand.as_deref_mut().filter(|hand| hand.waits == HandWaits::View) else { return };
     if hand.ending.is_none() {
@@ -124,7 +125,7 @@ fn view_chosen(model: &mut Model, numbers: &Numbers, number: u64, choice: HandCh
             hand.waits = HandWaits::View;
         }
         Some(HandNext::End(_)) if matches!(model.solve.status, SolveStatus::Running { .. }) => {
-            // The captures or the goal are others than those that were chosen by.
+            // The captures or the goal have changed since the choice.
             hand.goes_on();
         }
         Some(HandNext::End(ending)) => {
@@ -140,7 +141,7 @@ fn view_chosen(model: &mut Model, numbers: &Numbers, number: u64, choice: HandCh
     }
 }
 
-/// Compares the newest image with the view that is wanted, and captures where it is good and the robot stands.
+/// Compares the newest image with the view that is wanted, and captures where it is good and the robot is at rest.
 pub(crate) fn look_by_hand(model: &mut Model, workers: &Workers, numbers: &mut Numbers) {
     let now_s = model.now_s;
     if model.motion != Motion::Idle || model.sequence_runs {
@@ -177,7 +178,7 @@ pub(crate) fn captured_by_hand(model: &mut Model, role: Option<Role>) {
     match (role, &hand.ending) {
         (Some(Role::Verification), Some(_)) => hand.checked += 1,
         (Some(Role::Calibration), None) => hand.guide.captured(),
-        // What somebody took besides answers no question of the guide.
+        // A capture that the user took in addition is not an answer to the guide.
         _ => {}
     }
     hand.goes_on();
@@ -212,7 +213,7 @@ fn guiding_ends(model: &mut Model, severity: Severity, why: Text) {
 }
 
 impl ByHand {
-    /// To the answer from all captures, and the next view after it.
+    /// On to the answer from all captures, and the next view after it.
     fn goes_on(&mut self) {
         self.waits = HandWaits::Answer;
         self.wanted = None;

@@ -1,4 +1,4 @@
-//! Chooses the next view for a person who moves the robot.
+//! Chooses the next view for a user who moves the robot by hand.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -15,20 +15,20 @@ use crate::by_hand;
 use crate::model::Solved;
 use crate::worker::link::Outlet;
 
-/// A choice that is asked for.
+/// A requested choice.
 pub(crate) struct HandJob {
     pub number: u64,
     /// What chooses.
     pub guide: HandGuide,
     /// What was observed.
     pub observations: Observations,
-    /// The lens by which the first views are drawn.
+    /// The lens with which the first views are drawn.
     pub intrinsics: Intrinsics,
-    /// The answer from it, where there is one.
+    /// The answer from them, if there is one.
     pub solved: Option<Arc<Solved>>,
     /// Since the beginning \[s\].
     pub elapsed_s: f64,
-    /// The number of the check and how many were left out, where a view to check the answer at is asked for.
+    /// The number of the check and how many were skipped, if a verification view is requested.
     pub check: Option<(usize, usize)>,
 }
 
@@ -39,7 +39,7 @@ pub fn choose(job: &HandJob, cancel: &CancelToken, outlet: &Outlet) {
     let known = Known { observations: &job.observations, calibration, robot: None, elapsed_s: job.elapsed_s };
     let chosen = catch_unwind(AssertUnwindSafe(|| chosen(job, &mut guide, &known, cancel)));
     let next = chosen.unwrap_or_else(|_panic| {
-        // It must not take the thread along, nor leave a person waiting.
+        // A panic must not end the thread, nor leave the user waiting.
         tracing::error!("the choice of a view failed by a defect of this program: report it");
         None
     });

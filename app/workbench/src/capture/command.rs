@@ -1,4 +1,4 @@
-//! What may be wanted of captures, and what is reported.
+//! Commands and events of captures.
 
 use handeye_session::CaptureId;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use crate::model::{CaptureOptions, CapturePurpose, CaptureRefused, CaptureWait};
 pub enum Command {
     /// Take a capture as soon as robot and image have settled.
     Take(CapturePurpose),
-    /// Not now.
+    /// Cancel the capture.
     Cancel,
     /// How captures are taken.
     SetOptions(CaptureOptions),
@@ -26,7 +26,7 @@ pub enum Event {
     /// There is no capture.
     Refused {
         number: u64,
-        /// Why.
+        /// The reason.
         refused: CaptureRefused,
     },
     /// A capture is on the disk.

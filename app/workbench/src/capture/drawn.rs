@@ -1,4 +1,4 @@
-//! Images of a board that tests draw.
+//! Images of a board, drawn for tests.
 
 use handeye_geometry::targets::{Grid, TargetSpec};
 use image::{Rgb, RgbImage};
@@ -11,7 +11,7 @@ pub fn board(blur_px: i32) -> RgbImage {
     brighter_board(blur_px, 0.0)
 }
 
-/// The same, brighter by some grey levels.
+/// The same, brighter by this many grey levels.
 pub(crate) fn brighter_board(blur_px: i32, brighter: f64) -> RgbImage {
     let level = |u: i32, v: i32| {
         let (x, y) = ((u - 100).div_euclid(24), (v - 100).div_euclid(24));

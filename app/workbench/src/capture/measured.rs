@@ -31,7 +31,7 @@ pub struct Measured {
     pub depth: Option<DepthImage>,
     /// The tip as the controller reported it with the last of the images.
     pub base_from_tip: Pose<Base, Tip>,
-    /// The joints at the same instant \[rad\]; none where the robot does not report them.
+    /// The joints at the same instant \[rad\]; empty where the robot does not report them.
     pub joints_rad: JointValues,
     /// Simulated time of the last image \[s\].
     pub sim_time_s: f64,

@@ -8,7 +8,7 @@
 //! | [`Measured`] | a capture that is good, to be recorded in a session |
 //! | [`refusal`] | why there is none, in words |
 //!
-//! What is decided on the way (at rest, sharp, too similar) is decided in [`handeye_capture`].
+//! What is decided along the way (at rest, sharp, too similar) is decided in [`handeye_capture`].
 
 pub mod command;
 mod measured;

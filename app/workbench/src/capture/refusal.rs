@@ -82,7 +82,7 @@ pub fn no_board(target: &TargetSpec) -> Why {
     (RefusalKind::NoBoard, why)
 }
 
-/// Images come, and where the robot was is not known, for this reason.
+/// Images arrive, but the robot's pose is not known, for this reason.
 pub fn no_pose(why: Option<&Text>) -> Why {
     let why = match why {
         Some(why) => text!("The robot's pose for the image is not known: {why}", why = why.clone()),
@@ -96,7 +96,7 @@ pub(crate) fn not_searched(error: &VisionError) -> Why {
     (RefusalKind::NoBoard, text!("The board cannot be looked for: {why}", why = error))
 }
 
-/// Nobody has said what to look for.
+/// No target is configured.
 pub fn no_target() -> Why {
     (RefusalKind::NoBoard, text!("No board is chosen: choose the target and capture again"))
 }

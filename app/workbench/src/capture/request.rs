@@ -5,17 +5,17 @@ use handeye_session::Document;
 
 use crate::model::{CaptureOptions, CapturePurpose};
 
-/// A capture that is asked for.
+/// A requested capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaptureRequest {
-    /// Its number, which everything that is reported of it carries.
+    /// Its number, included in everything that is reported about it.
     pub number: u64,
     pub purpose: CapturePurpose,
     /// How it is taken.
     pub options: CaptureOptions,
     /// Name of the pose that it is taken at, where it has one.
     pub pose_name: Option<String>,
-    /// The captures that there are, by number, against which it must be different.
+    /// The existing captures, by number, from which it must differ.
     pub others: Vec<(u32, Pose<Base, Tip>)>,
 }
 

@@ -16,7 +16,7 @@ use super::refusal::{self, Why};
 use super::{CaptureRequest, Measured, thumbnail};
 use crate::model::{CaptureOptions, CaptureWait, FrameInfo, LiveFrame};
 
-/// The capture that is under way: takes in images one by one, from the request on, and says what it waits for. Never
+/// The capture that is under way: takes in images one by one, from the request on, and reports what it waits for. Never
 /// waits itself.
 #[derive(Debug)]
 pub struct Sequence {
@@ -30,7 +30,7 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// A request at a time on the clock that images arrive by, for the board that is looked for.
+    /// A request at a time on the clock of the image arrivals, for the board that is looked for.
     pub(crate) fn new(request: CaptureRequest, target: TargetSpec, now_s: f64) -> Self {
         let CaptureOptions { frames, least_distance_m, least_angle_rad, settle_limit_s } = request.options;
         let others = request.others.clone();
@@ -78,7 +78,7 @@ impl Sequence {
         averages && self.request.options.frames >= capture::Scatter::LEAST_IMAGES
     }
 
-    /// Tells where the board was in the last image that was taken in.
+    /// Reports where the board was in the last image that was taken in.
     pub(crate) fn saw_board(&mut self, number: u64, corners: &[Corner]) {
         self.machine.saw_board(number, corners);
     }

@@ -19,11 +19,11 @@ pub struct LiveDetection {
     pub camera_from_target: Option<Pose<Camera, Target>>,
     /// Where the tip was, where that is known.
     pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// The joints at the same instant \[rad\]; none where the robot does not report them.
+    /// The joints at the same instant \[rad\]; empty where the robot does not report them.
     pub joints_rad: JointValues,
     /// How long the search took \[s\].
     pub took_s: f64,
-    /// Why the image could not be searched at all, which is another thing than a board that is not in it.
+    /// Why the image could not be searched at all, as opposed to a board that is not in it.
     pub problem: Option<VisionError>,
     /// Frames so far that were never searched, because newer ones came first.
     pub dropped: u64,
@@ -34,7 +34,7 @@ pub enum CapturePurpose {
     /// It enters the fit.
     #[default]
     Calibrate,
-    /// It never enters the fit and tells how good it is.
+    /// It never enters the fit and shows how good it is.
     Verify,
 }
 

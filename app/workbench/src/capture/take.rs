@@ -17,7 +17,7 @@ pub trait Images {
     fn now_s(&self) -> f64;
 
     /// Waits for the images of a later instant than those before. Gives those of the same instant again where simulated
-    /// time stands still, so that it is noticed.
+    /// time is paused, so that this is noticed.
     ///
     /// # Errors
     /// Whatever comes back ends the capture.
@@ -49,8 +49,8 @@ pub fn take<P: Images>(
         let (number, received_s) = (frame.info.number, frame.info.received_s);
         let grey = gray_from_rgb(&frame.images.rgb);
         sequence.see(&frame, &grey);
-        // An image in which the quick search does not find the board tells nothing of its corners; whether it is there is
-        // decided in the average.
+        // An image in which the quick search does not find the board tells nothing about its corners; whether it is there
+        // is decided in the average.
         if sequence.compares_corners()
             && let Ok(Some(corners)) = detect_with(&grey, target, &DetectOptions::live().cancelled_by(cancel))
         {

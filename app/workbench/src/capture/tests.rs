@@ -72,7 +72,7 @@ fn request(frames: u32) -> CaptureRequest {
     }
 }
 
-/// A capture that nobody cancels.
+/// A capture that is never cancelled.
 fn take_all<F: FnMut(u64) -> Result<RgbImage, &'static str>>(
     request: CaptureRequest,
     target: &TargetSpec,
@@ -97,7 +97,7 @@ fn four_images_show_that_everything_is_at_rest_and_the_next_ones_are_averaged() 
     assert_eq!((measured.frames, reel.number, last.info.number), (3, 6, 6), "images 4, 5 and 6");
     assert_eq!(*measured.rgb, brighter_board(1, 5.0), "their mean");
     assert_eq!(measured.sim_time_s, last.info.sim_time_s);
-    // Three intervals, whose sum is rounded.
+    // Three intervals, with a rounded sum.
     assert!((measured.settled_s - 3.0 * 0.05).abs() < 1e-12, "{} s", measured.settled_s);
     assert_eq!(measured.corners.len(), 70);
     assert!(measured.corner_noise_px.is_some_and(|noise_px| noise_px < 0.01), "compared in all three");
@@ -115,7 +115,7 @@ fn what_is_no_good_is_refused_with_the_reason() {
     let sharp = board(0);
     let (kind, why) = refused(take_all(near, &BOARD, &mut Reel::new(|_| Ok(sharp.clone()))));
     assert_eq!(kind, RefusalKind::TooSimilar, "{why}");
-    // Only a part of the image: that of a lamp would be no change.
+    // Only a part of the image: a change by a lamp would affect all of it.
     let waving = |number: u64| {
         let mut rgb = sharp.clone();
         (0..480).for_each(|u| (300..360).for_each(|v| rgb.put_pixel(u, v, Rgb([90 * (number % 2) as u8; 3]))));

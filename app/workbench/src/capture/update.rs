@@ -13,7 +13,7 @@ use crate::taught::sequence::{break_off, sequence_captured, sequence_refused};
 use crate::worker::{VisionTask, Workers};
 use handeye_wording::text;
 
-/// Does what is wanted of captures.
+/// Does what the user wants with captures.
 pub(crate) fn apply(model: &mut Model, workers: &Workers, numbers: &mut Numbers, command: Command) {
     match command {
         Command::Take(purpose) => capture(model, workers, numbers, purpose, None),
@@ -22,7 +22,7 @@ pub(crate) fn apply(model: &mut Model, workers: &Workers, numbers: &mut Numbers,
     }
 }
 
-/// Takes in how a capture goes on.
+/// Takes in the progress of a capture.
 pub(crate) fn absorb(cx: &mut Context, event: Event) {
     match event {
         Event::Waits { number, wait } => capture_waits(&mut cx.model, number, wait),
@@ -43,7 +43,7 @@ pub(crate) fn capture(
     pose_name: Option<String>,
 ) {
     if model.capture.is_some() {
-        // Pressing twice must not take two.
+        // Pressing twice must not take two captures.
         return;
     }
     if refuses_without_robot(model) {

@@ -1,4 +1,4 @@
-//! What may be wanted of the connection to the cell, and what is reported.
+//! Commands and events of the connection to the cell.
 
 use handeye_coppeliasim::cell::CellPaths;
 use handeye_geometry::frames::Base;
@@ -17,7 +17,7 @@ pub enum Command {
     StartSimulation,
     /// Try to connect now, without waiting for the next try.
     Reconnect,
-    /// Start drivers that are gone no more, until [`Command::Reconnect`].
+    /// Stop restarting drivers that are gone, until [`Command::Reconnect`].
     StopTrying,
     /// Work with another cell.
     Connect(CellSource),
@@ -43,11 +43,11 @@ pub enum Event {
     },
     /// The robot was read.
     Robot(RobotState),
-    /// Nobody says any more where the robot is.
+    /// The robot's pose is no longer reported.
     NoRobot,
     /// A cell was connected.
     Cell(Box<CellFacts>),
-    /// A driver said something for people.
+    /// A driver sent a message for the user.
     Heard {
         /// How much it matters.
         severity: Severity,

@@ -1,4 +1,4 @@
-//! The drivers that come with the program, with what each has to be told; and their command lines.
+//! The drivers that come with the program, with the options of each; and their command lines.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use crate::arguments::ArmErrorsChoice;
 use crate::text::Language;
 use crate::tr;
 
-/// What the values of fields are, by option; those that are not given are not in it.
+/// Values of fields, by option; fields without a value are not in it.
 pub type Values = BTreeMap<&'static str, String>;
 
-/// For what a driver is chosen.
+/// What a driver is chosen for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The robot, and its camera where the driver has one.
@@ -27,15 +27,15 @@ pub enum Part {
 pub struct Offered {
     /// Its subcommand of `handeye driver`.
     pub name: &'static str,
-    /// For what it can be chosen.
+    /// What it can be chosen for.
     parts: &'static [Part],
-    /// What it is always told where it is the camera alone.
+    /// What it is always given where it is the camera alone.
     pub camera_alone: &'static [&'static str],
-    /// What it can be told.
+    /// What can be set for it.
     pub fields: &'static [Field],
 }
 
-/// Something that a driver can be told.
+/// Something that can be set for a driver.
 #[derive(Debug)]
 pub struct Field {
     /// The option; empty for an argument without one.
@@ -44,7 +44,7 @@ pub struct Field {
     pub kind: FieldKind,
     /// Whether it is of use for a camera alone.
     pub for_camera: bool,
-    /// How soon it is looked for.
+    /// How prominently it is shown.
     pub rank: Rank,
 }
 
@@ -59,10 +59,10 @@ pub enum FieldKind {
     Switch,
 }
 
-/// How soon a field is looked for.
+/// How prominently a field is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rank {
-    /// Nothing goes without it.
+    /// It is required.
     Needed,
     /// Usually set.
     Usual,
@@ -81,7 +81,7 @@ const fn robot_field(option: &'static str, kind: FieldKind, rank: Rank) -> Field
 use FieldKind::{Switch, Text, Word};
 use Rank::{More, Needed, Usual};
 
-/// Of every driver that is a Python file: with which Python, where it is not to have an environment of its own.
+/// For every driver that is a Python file: which Python to use, if it should not have an environment of its own.
 const PYTHON: Field = field("--python", Text("/usr/bin/python3"), More);
 
 /// All of them, in the order of the list.
@@ -172,8 +172,8 @@ pub fn of_part(part: Part) -> impl Iterator<Item = &'static Offered> {
     ALL.iter().filter(move |offered| offered.parts.contains(&part))
 }
 
-/// Which of them a command line starts, and with which values; `None` for another program, and for one of them that is told
-/// something else than there are fields for.
+/// Which of them a command line starts, and with which values; `None` for another program, and for one of them with options
+/// that have no field.
 pub fn parse(command: &str, part: Part) -> Option<(&'static Offered, Values)> {
     let Ok(DriverSpec::Command(words)) = command.parse() else { return None };
     let [program, driver, name, reported @ ..] = words.as_slice() else { return None };
@@ -225,7 +225,7 @@ impl Offered {
         }
     }
 
-    /// The command line with these values; `None` while one is missing that nothing goes without.
+    /// The command line with these values; `None` while a required one is missing.
     pub fn command(&self, part: Part, values: &Values) -> Option<String> {
         let mut words = vec![PROGRAM.to_owned(), "driver".to_owned(), self.name.to_owned()];
         for field in self.fields_of(part) {
@@ -235,7 +235,7 @@ impl Offered {
                 (None, _) => {}
                 (Some(_), Switch) => words.push(field.option.to_owned()),
                 (Some(value), _) if field.option.is_empty() => words.push(value.to_owned()),
-                // In one word a value that begins with a hyphen is no option.
+                // In one word a value that begins with a hyphen is not taken for an option.
                 (Some(value), _) if value.starts_with('-') => words.push(format!("{}={value}", field.option)),
                 (Some(value), _) => words.extend([field.option.to_owned(), value.to_owned()]),
             }
@@ -255,7 +255,7 @@ impl Offered {
         }
     }
 
-    /// What there is to know of it.
+    /// A description.
     pub fn about(&self, part: Part, language: Language) -> &'static str {
         match (self.name, part) {
             ("ur-rtde", _) => tr!(

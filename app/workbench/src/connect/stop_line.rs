@@ -1,4 +1,4 @@
-//! The way of a stop to the arm, for every thread.
+//! The path of a stop to the arm, from every thread.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -9,21 +9,21 @@ use crate::worker::channels::{Counter, Requests};
 use crate::worker::{Clock, Request};
 
 /// Stops the arm from any thread. Nothing in here waits: a stop is a count that the control worker looks at before anything
-/// else, and it stays ahead until the arm has been stopped, over every connection and every cell.
+/// else, and it takes precedence until the arm has been stopped, over every connection and every cell.
 ///
-/// A stop that does not come from the thread that draws is ahead of what that thread still does: what a person asked for
-/// before it, and a sequence that goes on by itself. Until that thread has taken note of the stop, nothing that moves
-/// begins.
+/// A stop that does not come from the thread that draws takes precedence over what that thread still does: what the user
+/// requested before it, and a sequence that continues by itself. Until that thread has handled the stop, nothing that
+/// moves begins.
 #[derive(Default)]
 pub struct StopLine {
     stops: Counter,
-    /// Those that other threads pressed than the one that draws, done when that has taken note of them.
+    /// Those pressed by threads other than the one that draws, done when that one has handled them.
     outside: Counter,
     ends: Mutex<Option<Ends>>,
     grip: Arc<Grip>,
 }
 
-/// What a stop reaches in the cell that is worked with.
+/// What a stop reaches in the current cell.
 pub struct Ends {
     /// The motions that wait.
     pub desk: Arc<MotionQueue>,
@@ -34,7 +34,7 @@ pub struct Ends {
 }
 
 impl StopLine {
-    /// What a person holds down at a page.
+    /// What the user holds down at a page.
     pub fn grip(&self) -> &Arc<Grip> {
         &self.grip
     }
@@ -44,7 +44,7 @@ impl StopLine {
         self.stops.ask();
         if let Some(ends) = self.ends().as_ref() {
             ends.desk.cancel((ends.clock)());
-            // Only to wake a resting worker: one that is too busy to take it looks at the line by itself.
+            // Only to wake a resting worker: one that is too busy to take it checks the stop line by itself.
             let _full = ends.control.ask(Request::Do(ControlTask::CheckStop)).is_err();
         }
     }
@@ -56,7 +56,7 @@ impl StopLine {
         number
     }
 
-    /// The same when this program moves the arm; motions of others are none of its business.
+    /// The same when this program moves the arm; it does not stop motions of others.
     pub fn press_if_moving(&self) {
         let is_moving = self.ends().as_ref().is_some_and(|ends| ends.desk.is_busy((ends.clock)()));
         if is_moving {
@@ -69,7 +69,7 @@ impl StopLine {
         self.outside.asked()
     }
 
-    /// The thread that draws has taken note of so many of them: what it asks for from now on was asked for after them.
+    /// The thread that draws has handled this many of them: what it requests from now on was requested after them.
     pub(crate) fn note(&self, number: u64) {
         self.outside.finish(number);
     }
@@ -94,12 +94,12 @@ impl StopLine {
         self.stops.finish(number);
     }
 
-    /// From now on a stop reaches these.
+    /// From now on a stop reaches these ends.
     pub fn lead_to(&self, ends: Ends) {
         *self.ends() = Some(ends);
     }
 
-    /// It does not reach these any more, unless others have taken their place.
+    /// A stop does not reach these any more, unless they were already replaced.
     pub(crate) fn lead_away_from(&self, desk: &Arc<MotionQueue>) {
         self.ends().take_if(|ends| Arc::ptr_eq(&ends.desk, desk));
     }

@@ -22,7 +22,7 @@ use crate::track::update::{reconsider_correction, send_tracking};
 use crate::worker::{CameraTask, ControlTask, Request, SessionThreads, Workers};
 use handeye_wording::text;
 
-/// Earlier addresses that are offered again.
+/// Number of earlier addresses that are offered again.
 pub const ADDRESSES: usize = 8;
 
 /// Does what is wanted of the connection.
@@ -39,7 +39,7 @@ pub(crate) fn apply(cx: &mut Context, connector: &Connector, command: Command) {
     }
 }
 
-/// Takes in what the cell says.
+/// Takes in what the cell reports.
 pub(crate) fn absorb(cx: &mut Context, event: Event) {
     match event {
         Event::Link { link, state } => link_changed(cx, link, state),
@@ -68,7 +68,7 @@ fn start_simulation(model: &mut Model, workers: &Workers) {
     model.notify_if_refused(text!("The simulation was not started"), asked);
 }
 
-/// Tries now what is being tried. A connection that works is made again, because the scene may be another one.
+/// Retries now what is being retried. A connection that works is made again, because the scene may have changed.
 fn reconnect(cx: &mut Context, connector: &Connector) {
     if cx.model.control.is_connected() && !cx.model.source.is_built_in() {
         return connect(cx, connector, cx.model.source.clone());
@@ -77,7 +77,7 @@ fn reconnect(cx: &mut Context, connector: &Connector) {
     cx.model.notify_if_refused(text!("The connection was not tried again"), asked);
 }
 
-/// Starts drivers that are gone no more.
+/// Stops restarting drivers that are gone.
 fn stop_trying(model: &mut Model, workers: &Workers) {
     let asked = workers.stop_trying();
     model.notify_if_refused(text!("Trying to connect was not stopped"), asked);
@@ -94,7 +94,7 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
     cx.model.frame = None;
     cx.model.cell = None;
     cx.model.detection = None;
-    // Planned poses are those of the other arm.
+    // Planned poses belong to the other arm.
     cx.model.sequence = None;
     cx.model.sequence_runs = false;
     cx.model.asked = None;
@@ -119,7 +119,7 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
             if let Err(error) = farewell {
                 tracing::warn!(%error, "the connection before was left alone");
             }
-            // Which cell they are of no session says.
+            // A session does not record which cell its captures are of.
             if source != cx.model.source && !cx.model.document().captures.is_empty() {
                 cx.model.notify(
                     Severity::Warning,
@@ -144,7 +144,7 @@ fn connect(cx: &mut Context, connector: &Connector, source: CellSource) {
     send_tracking(&mut cx.model, &cx.workers);
 }
 
-/// The objects of the scene are others: everything that was read of them is, too.
+/// The objects of the scene have changed, so everything that was read from them has, too.
 fn set_objects(cx: &mut Context, connector: &Connector, objects: CellPaths) {
     cx.model.objects = objects;
     if matches!(cx.model.source, CellSource::Address(_)) {
@@ -173,7 +173,7 @@ fn cell_found(model: &mut Model, workers: &Workers, desk: &SessionThreads, facts
     let had_arm = model.cell.as_ref().is_some_and(|before| before.arm.is_some());
     model.scene_is_fitted &= had_arm == facts.arm.is_some();
     model.cell = Some(facts);
-    // Poses that were chosen by that chain are not driven to, neither the one under way nor one that waits.
+    // Poses that were chosen with that chain are no longer visited, neither the one under way nor one that waits.
     if is_foreign && model.sequence.as_ref().is_some_and(|sequence| sequence.planned.is_some()) {
         stop_sequence(model, workers);
     }
@@ -210,7 +210,7 @@ fn link_changed(cx: &mut Context, link: Link, state: LinkState) {
             let text = match link {
                 Link::Control => text!("Robot connection lost: {why}", why = why),
                 Link::Camera => text!("Camera connection lost: {why}", why = why),
-                // Images and joints go on, so no card below the steps reports it.
+                // Images and joints still work, so no card below the steps reports it.
                 Link::Motion => {
                     let reported = text!("Connection for motions lost: {why}", why = why);
                     return cx.model.notify(Severity::Warning, reported);
@@ -231,7 +231,7 @@ fn arm(model: &mut Model, workers: &Workers, on: bool) {
     model.notify_if_refused(text!("The permission to move the robot was not changed"), asked);
 }
 
-/// Takes the pose that the pendant shows; `None` once the robot is moved on.
+/// Takes the pose that the pendant shows; `None` once the robot has moved on.
 fn type_pose(model: &mut Model, workers: &Workers, pose: Option<Pose<Base, Tip>>) {
     let asked = workers.ask_control(Request::Do(ControlTask::TypePose(pose)));
     model.notify_if_refused(text!("The pose was not taken"), asked);
@@ -244,7 +244,7 @@ pub(crate) fn forget_typed_pose(model: &mut Model, workers: &Workers) {
     }
 }
 
-/// A driver said something for people.
+/// A driver sent a message for the user.
 fn heard(model: &mut Model, severity: Severity, words: String) {
     let home = if severity == Severity::Error { Home::Toast } else { Home::Log };
     model.messages.notify_at(home, severity, Text::verbatim(words), model.now_s);
@@ -263,14 +263,14 @@ pub(crate) fn ask_camera(
     taken
 }
 
-/// Starts the built-in cell again: arm and board are where they are at first.
+/// Starts the built-in cell again: arm and board are back at their initial poses.
 fn reset_cell(cx: &mut Context, connector: &Connector) {
     if let CellSource::BuiltIn(_) = cx.model.source {
         connect(cx, connector, cx.model.source.clone());
     }
 }
 
-/// Puts it before the others, once.
+/// Puts it before the others, without duplicates.
 fn put_first<T: PartialEq + Clone>(earlier: &mut Vec<T>, newest: &T) {
     earlier.retain(|other| other != newest);
     earlier.insert(0, newest.clone());

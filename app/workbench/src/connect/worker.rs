@@ -16,7 +16,7 @@ use crate::{connect, motion};
 use handeye_link::{Cell, Connected, ControlPort, PortError};
 use handeye_wording::text;
 
-/// Rest between two readings: numbers that change faster cannot be read, and each reading draws the window.
+/// Pause between two readings: numbers that change faster cannot be read, and each reading redraws the window.
 const PERIOD: Duration = Duration::from_millis(100);
 
 /// What the control worker can be asked for.
@@ -32,20 +32,20 @@ pub enum ControlTask {
     HideBoard(bool),
     /// Let a robot behind a driver be moved, or no longer.
     Arm(bool),
-    /// The pose that a person reads off the pendant.
+    /// The pose that the user reads off the pendant.
     TypePose(Option<Pose<Base, Tip>>),
 }
 
-/// The duty of the control worker.
+/// The job of the control worker.
 pub struct Control {
     stop: Arc<StopLine>,
     robot: Arc<LatestSlot<Option<RobotState>>>,
-    /// The newest state that was put there was one.
+    /// The newest state in the slot is a known one.
     is_known: bool,
-    /// The built-in cell belongs to this program, which starts its simulation; on somebody's CoppeliaSim that is for
-    /// the user to decide.
+    /// The built-in cell belongs to this program, which starts its simulation; on a user's CoppeliaSim that is for the
+    /// user to decide.
     start_by_itself: bool,
-    /// The connection is new.
+    /// The connection is new, and its facts are not reported yet.
     owes_facts: bool,
 }
 

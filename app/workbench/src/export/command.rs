@@ -1,4 +1,4 @@
-//! What may be wanted of exports, and what is reported.
+//! Commands and events of exports.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;

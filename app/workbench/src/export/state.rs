@@ -23,7 +23,7 @@ pub struct ExportState {
     pub previews: BTreeMap<String, Preview>,
     /// How the last writing went.
     pub written: Option<Written>,
-    /// Whether files of the present captures are there, written now or when the session was open before.
+    /// Whether files of the present captures are there, written now or in an earlier run.
     pub is_present: bool,
     /// Whether files are being written.
     pub writing: bool,

@@ -1,4 +1,4 @@
-//! What may be wanted of guided capture, and what is reported.
+//! Commands and events of guided capture.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,8 @@
 //! Guided capture in the window: one button from the board in view to a calibration that was checked.
 //!
 //! It is a sequence of poses that grows: after each capture and its answer the motion thread, which knows the arm, has the
-//! next pose chosen ([`handeye_plan::guided`]). Whatever ends a sequence ends it: STOP, another cell, another session.
+//! next pose chosen ([`handeye_plan::guided`]). Whatever ends another sequence ends it, too: STOP, another cell, another
+//! session.
 
 pub mod command;
 pub mod state;

@@ -23,9 +23,9 @@ pub struct GuidedProgress {
     pub why: Option<Why>,
     /// The pose that is next, and those after it as far as it is planned.
     pub ahead: Vec<Proposal>,
-    /// Poses that are expected to lead to the goal; `None` where nobody knows.
+    /// Poses that are expected to lead to the goal; `None` if unknown.
     pub views_left: Option<usize>,
-    /// Where the arm was when the next pose was chosen, from where the way to it was checked.
+    /// Where the arm was when the next pose was chosen; the path was checked from there.
     pub chosen_at: Option<JointValues>,
     /// Since when \[s\], and after how many poses, it has been under way without a pause.
     pub since: (f64, usize),
@@ -33,18 +33,18 @@ pub struct GuidedProgress {
     pub ending: Option<Ending>,
     /// Captures so far that check it.
     pub checked: usize,
-    /// Poses that were tried for that.
+    /// Poses that were tried for checks.
     pub tried: usize,
-    /// Moves in a row that the robot did not begin.
+    /// Consecutive moves that the robot did not begin.
     pub refused_moves: usize,
-    /// It has come to its end, and there is nothing to go on with.
+    /// It has ended and cannot be continued.
     pub is_over: bool,
 }
 
 /// What a guided sequence waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Waits {
-    /// For nothing: a pose is under way, or waits for the person who lets the arm move.
+    /// Nothing: a pose is under way, or waits for the user to allow the move.
     Nothing,
     /// For the answer from all captures.
     Answer,
@@ -89,7 +89,7 @@ pub struct GuideRequest {
     pub check: Option<usize>,
 }
 
-/// By its choice alone: observations are large, and two requests are never compared but in tests.
+/// Compares the choice alone: observations are large, and two requests are only compared in tests.
 impl PartialEq for GuideRequest {
     fn eq(&self, other: &Self) -> bool {
         self.guide == other.guide && self.check == other.check
@@ -105,7 +105,7 @@ pub struct Choice {
     pub step: ChosenStep,
     /// See [`GuidedProgress::views_left`].
     pub views_left: Option<usize>,
-    /// Where the arm stood when it was chosen.
+    /// Where the arm was when it was chosen.
     pub chosen_at: JointValues,
 }
 
@@ -114,12 +114,12 @@ pub struct Choice {
 pub enum ChosenStep {
     /// A pose, or the end of the choice.
     Next(Box<Next>),
-    /// A pose to check the answer at; `None` where there is none in reach.
+    /// A pose to check the answer at; `None` if none is in reach.
     Check(Option<Box<Proposal>>),
 }
 
 impl GuideRequest {
-    /// Chooses, for an arm that stands still. Takes some tenths of a second.
+    /// Chooses, for an arm that is at rest. Takes some tenths of a second.
     pub(crate) fn choose(&self, robot: &Robot, cancel: &CancelToken) -> Choice {
         let mut guide = self.guide.clone();
         let calibration = self.solved.as_ref().map(|solved| &solved.calibration);
@@ -143,13 +143,13 @@ impl GuideRequest {
 /// What a choice was, or why there is none.
 pub(crate) type ChoiceOutcome = Result<Box<Choice>, Text>;
 
-/// What is asked for, beyond captures that there are.
+/// The options for a guided capture, in addition to existing captures.
 pub(crate) fn options(goal_m: f64, views: usize) -> GuidedOptions {
     let default = GuidedOptions::default();
     GuidedOptions { goal_m, most_views: default.most_views + views, ..default }
 }
 
-/// How it ended, after so many checks.
+/// How it ended, after this many checks.
 pub(crate) fn ended(ending: &Ending, checked: usize) -> (Severity, Text) {
     if checked < CHECKS {
         let reported = text!(

@@ -1,4 +1,4 @@
-//! How a guided sequence goes on.
+//! How a guided sequence continues.
 
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub(crate) fn absorb(cx: &mut Context, event: Event) {
     guided_chosen(cx, id, outcome);
 }
 
-/// From the board in view to the goal. Captures that there are count; without any the first is taken here.
+/// From the board in view to the goal. Existing captures count; if there are none, the first is taken here.
 fn calibrate_for_me(cx: &mut Context) {
     if cx.model.sequence_runs || cx.model.planning {
         return;
@@ -40,7 +40,7 @@ fn calibrate_for_me(cx: &mut Context) {
     let Some(joints) = cx.model.robot.as_ref().map(|robot| robot.joints_rad) else { return };
     let views = cx.model.document().in_use().filter(|it| corners(&cx.model, it.id).is_some()).count();
     let options = options(cx.model.view.goal.0, views);
-    // What a view adds is known of the joint estimate alone.
+    // What a view adds is only known for the joint estimate.
     set_method(&mut cx.model, &mut cx.desk, &mut cx.numbers, Method::Joint.name());
     cx.model.messages.is_over_in(Pane::Poses);
     let here = if views > 0 { Vec::new() } else { vec![joints] };
@@ -57,8 +57,8 @@ fn calibrate_for_me(cx: &mut Context) {
     );
 }
 
-/// Whether the last sequence is a guided one that was broken off: it goes on with a choice from where the arm is now,
-/// because the way to the pose that was left out is another one than was checked.
+/// Whether the last sequence is a guided one that was interrupted: it continues with a choice from where the arm is
+/// now, because the path to the skipped pose differs from the one that was checked.
 pub(crate) fn continue_guided(cx: &mut Context) -> bool {
     let is_idle = !cx.model.sequence_runs && !cx.model.planning;
     let has_captures = !cx.model.document().captures.is_empty();
@@ -87,7 +87,7 @@ fn guided_mut(model: &mut Model) -> Option<&mut GuidedProgress> {
     model.sequence.as_mut().filter(|_| runs)?.guided.as_deref_mut()
 }
 
-/// All poses that were chosen have been visited; whether that is for the guide to go on with.
+/// All chosen poses have been visited; whether the guide continues from here.
 pub(crate) fn guided_waits(model: &mut Model, desk: &SessionThreads) -> bool {
     let has_captures = !model.document().captures.is_empty();
     let left_out = model.sequence.as_ref().and_then(|sequence| sequence.last_skipped().cloned());
@@ -99,8 +99,8 @@ pub(crate) fn guided_waits(model: &mut Model, desk: &SessionThreads) -> bool {
     true
 }
 
-/// The robot does not move to a pose of a guided sequence; whether it did not to the one before, either. A chosen pose is
-/// within the limits of the joints and free to reach, so it is then not the pose that is in the way.
+/// The robot does not move to a pose of a guided sequence; whether the same happened for the one before. A chosen pose is
+/// within the limits of the joints and free to reach, so the pose is then not the reason.
 pub(crate) fn guided_was_refused(model: &mut Model) -> bool {
     let Some(guided) = guided_mut(model) else { return false };
     guided.refused_moves += 1;
@@ -128,7 +128,7 @@ pub(crate) fn guided_visited(model: &mut Model, outcome: &StopOutcome) {
     }
 }
 
-/// Asks for the next pose as soon as the answer from all captures is there. Looked at after every event, because the
+/// Requests the next pose as soon as the answer from all captures is there. Looked at after every event, because the
 /// answer may come in several ways, or not at all.
 pub(crate) fn guided_step(model: &mut Model, workers: &Workers, numbers: &mut Numbers) {
     let waits = guided_mut(model).map(|guided| guided.waits);
@@ -157,13 +157,13 @@ pub(crate) fn guided_step(model: &mut Model, workers: &Workers, numbers: &mut Nu
 
 /// The next pose is chosen, or there is none.
 fn guided_chosen(cx: &mut Context, id: MotionId, outcome: ChoiceOutcome) {
-    // After a stop nothing begins by itself now.
+    // After a stop nothing starts by itself.
     if id != cx.numbers.motion || guided_mut(&mut cx.model).is_none_or(|guided| guided.waits != Waits::Choice) {
         return;
     }
     let Choice { guide, step, views_left, chosen_at } = match outcome {
         Ok(choice) => *choice,
-        // As where the connection broke: nothing says that there are no more poses.
+        // As where the connection broke: that does not mean that there are no more poses.
         Err(why) => return break_off(&mut cx.model, Some(why)),
     };
     let Some(guided) = guided_mut(&mut cx.model) else { return };
@@ -193,7 +193,7 @@ fn guided_chosen(cx: &mut Context, id: MotionId, outcome: ChoiceOutcome) {
     keep_guided(&mut cx.model, &cx.desk);
 }
 
-/// To the pose that is next.
+/// Starts towards the next pose.
 fn guided_sets_out(cx: &mut Context) {
     if guided_is_elsewhere(&mut cx.model) {
         return;
@@ -203,10 +203,10 @@ fn guided_sets_out(cx: &mut Context) {
     }
 }
 
-/// Whether the arm is not where the way to the next pose was checked from; then another one is chosen.
+/// Whether the arm is not where the path to the next pose was checked from; then another pose is chosen.
 fn guided_is_elsewhere(model: &mut Model) -> bool {
     let now = model.robot.as_ref().map(|robot| robot.joints_rad);
-    // To the place where it begins there is no way.
+    // There is no path to the place where it begins.
     let Some(guided) = guided_mut(model).filter(|guided| !guided.ahead.is_empty()) else { return false };
     if !has_moved(guided.chosen_at.as_ref(), now.as_ref()) {
         return false;
@@ -218,7 +218,7 @@ fn guided_is_elsewhere(model: &mut Model) -> bool {
     true
 }
 
-/// The same for a pose that a person has just let the arm go to.
+/// The same for a pose that the user has just allowed the arm to move to.
 pub(crate) fn guided_chooses_anew(model: &mut Model) -> bool {
     let is_elsewhere = guided_is_elsewhere(model);
     if is_elsewhere {
@@ -227,7 +227,7 @@ pub(crate) fn guided_chooses_anew(model: &mut Model) -> bool {
     is_elsewhere
 }
 
-/// The last pose of the sequence is none of it after all.
+/// Removes the last pose of the sequence, which is not visited after all.
 fn guided_leaves_out(model: &mut Model) {
     let Some(sequence) = model.sequence.as_mut() else { return };
     sequence.names.pop();
@@ -236,7 +236,7 @@ fn guided_leaves_out(model: &mut Model) {
     }
 }
 
-/// A person leaves out the pose that is next; whether it was one of a guided sequence.
+/// The user skips the next pose; whether it belonged to a guided sequence.
 pub(crate) fn guided_skips(cx: &mut Context) -> bool {
     if guided_mut(&mut cx.model).is_none() {
         return false;
@@ -257,8 +257,8 @@ pub(crate) fn guided_skips(cx: &mut Context) -> bool {
     true
 }
 
-/// Has what was proposed and what came of it written beside the captures. The next one has it all again, so that one
-/// for which the disk is too busy is no loss.
+/// Writes what was proposed and what came of it next to the captures. The next record contains it all again, so nothing
+/// is lost if the disk is too busy for one.
 fn keep_guided(model: &mut Model, desk: &SessionThreads) {
     let guided = model.sequence.as_ref().and_then(|sequence| sequence.guided.as_deref());
     if let (Some(guided), Some(folder)) = (guided, model.session.folder.clone()) {
@@ -291,7 +291,7 @@ fn guided_goes_to(cx: &mut Context, proposal: &Proposal) {
 /// No more poses for the fit. Where there is an answer it is checked.
 fn choice_ended(cx: &mut Context, ending: Ending) {
     if matches!(cx.model.solve.status, SolveStatus::Running { .. }) {
-        // The captures or the goal are others than those that were chosen by.
+        // The captures or the goal have changed since the choice.
         if let Some(guided) = guided_mut(&mut cx.model) {
             guided.waits = Waits::Answer;
         }
@@ -312,7 +312,7 @@ fn choice_ended(cx: &mut Context, ending: Ending) {
     guided_step(&mut cx.model, &cx.workers, &mut cx.numbers);
 }
 
-/// Whether the sequence is guided and over: then it has been said how it went.
+/// Whether the sequence is guided and over: the outcome is then already reported.
 pub(crate) fn guided_is_over(model: &mut Model, desk: &SessionThreads) -> bool {
     if guided_mut(model).is_some_and(|guided| guided.checked >= CHECKS || guided.tried >= 2 * CHECKS) {
         guided_finished(model, desk);
@@ -330,7 +330,7 @@ fn guided_finished(model: &mut Model, desk: &SessionThreads) {
     guided_ends(model, desk, severity, reported);
 }
 
-/// A guided sequence is of one target and one set-up.
+/// A guided sequence belongs to one target and one set-up.
 pub(crate) fn forget_guided(model: &mut Model, workers: &Workers) {
     model.by_hand = None;
     if model.sequence.as_ref().is_some_and(|sequence| sequence.guided.is_some()) {

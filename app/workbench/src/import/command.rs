@@ -1,4 +1,4 @@
-//! What may be wanted of recordings in other tools' formats, and what is reported.
+//! Commands and events of recordings in other tools' formats.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,9 +15,9 @@ use crate::text::Text;
 pub enum Command {
     /// The target of the recording that is imported, as it is typed; empty: as its files have it.
     SetTarget(String),
-    /// Read the files of the recording again, for so many seconds at the most.
+    /// Read the files of the recording again, for at most this many seconds.
     SetTime(u32),
-    /// A convention of that recording, which the data need not tell.
+    /// A convention of that recording, which the data may not determine.
     FixConvention {
         /// Its key, as `handeye import --set` has it.
         key: String,
@@ -35,7 +35,7 @@ pub enum Command {
 /// What has happened to recordings in other tools' formats.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Event {
-    /// There is neither a session nor a data set: it may be somebody's recording.
+    /// There is neither a session nor a data set: it may be a recording of another tool.
     NoSession(PathBuf),
     /// How far a recording is looked at, or converted.
     Progress {
@@ -54,7 +54,7 @@ pub enum Event {
         /// Why no more was.
         trouble: Option<Text>,
     },
-    /// A recording was made a data set, or cannot be.
+    /// A recording was converted to a data set, or cannot be.
     #[serde(skip)]
     Converted {
         /// The number of the request.

@@ -19,7 +19,7 @@ use crate::text::Text;
 pub struct ImportState {
     /// The recording.
     pub path: PathBuf,
-    /// Of the newest request: answers to earlier ones are of no interest.
+    /// Number of the newest request: answers to earlier ones are ignored.
     pub number: u64,
     /// How long its files may be read.
     pub time: Duration,
@@ -40,9 +40,9 @@ pub struct ImportState {
 /// What is being done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ImportWork {
-    /// Files are read and images looked at; so many of so many.
+    /// Files are read and images searched; this many of this many.
     Looking(usize, usize),
-    /// It becomes a session; so many images of so many.
+    /// A session is being written; this many images of this many.
     Writing(usize, usize),
 }
 
@@ -51,11 +51,11 @@ pub enum ImportWork {
 pub struct Found {
     /// Its files.
     pub opened: Arc<Recording>,
-    /// It, with what was made of it when the images were looked at.
+    /// The same, with what was derived from it when the images were searched.
     pub recording: Arc<Recording>,
     /// What the images show; `None` where nothing could be looked for.
     pub looked: Option<Arc<Looked>>,
-    /// The target that a person named.
+    /// The target that the user named.
     pub given: Option<TargetSpec>,
     /// What the hypotheses were tried with.
     pub settings: Settings,
@@ -71,18 +71,18 @@ impl Found {
         self.judgement.as_ref().map_or(&[], |judgement| &judgement.hypotheses)
     }
 
-    /// Whether there are images that a camera can be calibrated with, also where nothing is known of a robot.
+    /// Whether there are images that a camera can be calibrated with, even if nothing is known about a robot.
     pub fn has_images(&self) -> bool {
         (0..self.recording.streams.len()).any(|i| self.recording.has_photographs(i))
     }
 
-    /// The target, and who says so, also where nothing else was made of the recording.
+    /// The target and where it comes from, even if nothing else was derived from the recording.
     pub fn target(&self) -> Option<(TargetSpec, String)> {
         let looked = self.looked.as_ref().and_then(|looked| looked.target.clone());
         looked.or_else(|| Some((self.given?, "given with --target".to_owned())))
     }
 
-    /// The hypothesis that needs nobody to choose it.
+    /// The hypothesis that does not need the user to choose it.
     pub(crate) fn decided(&self) -> Option<usize> {
         let verdict = self.judgement.as_ref().map(|judgement| &judgement.verdict);
         (verdict == Some(&Verdict::Decided)).then_some(0)
@@ -92,7 +92,7 @@ impl Found {
 /// A recording as a data set, on its way into a session.
 #[derive(Debug)]
 pub struct Converted {
-    /// The data set; it goes when the session is there.
+    /// The data set; it is deleted once the session exists.
     pub folder: TempDir,
     /// What the session is called.
     pub name: String,

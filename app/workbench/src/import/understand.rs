@@ -1,4 +1,4 @@
-//! From the files of a recording to the hypotheses about it: what the command line and the window both do.
+//! From the files of a recording to the hypotheses about it: used by both the command line and the window.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,13 +33,14 @@ pub enum NotUnderstood {
 /// What the images of a recording show.
 #[derive(Debug)]
 pub struct Looked {
-    /// The recording with what was made of it: poses by the chain of an arm, and at the times of images of a moving robot.
+    /// The recording with what was derived from it: poses by the chain of an arm, and at the times of images of a moving
+    /// robot.
     pub recording: Arc<Recording>,
-    /// The target, and who says so; `None` where only its poses are known.
+    /// The target and where it comes from; `None` where only its poses are known.
     pub target: Option<(TargetSpec, String)>,
     /// By stream: its name, in how many images the target was found, and of how many.
     pub seen: Vec<(String, usize, usize)>,
-    /// What else a person should know.
+    /// What else the user should know.
     pub notes: Vec<Text>,
     /// Why no image shows the target, where two series may be poses of the robot and of the target all the same.
     unseen: Option<Text>,
@@ -49,7 +50,7 @@ pub struct Looked {
 }
 
 impl Looked {
-    /// Tries every hypothesis that the files and the settings leave open. Settings that say what to look at
+    /// Tries every hypothesis that the files and the settings leave open. Settings that choose what to look at
     /// ([`looks`]) have to be those of [`look`].
     ///
     /// # Errors
@@ -67,7 +68,7 @@ impl Looked {
         if cancel.is_cancelled() { Err(ObserveError::Cancelled.into()) } else { Ok(judgement) }
     }
 
-    /// What goes into the data set beside a hypothesis; `is_taken`: a person took it out of several.
+    /// What goes into the data set in addition to a hypothesis; `is_taken`: the user chose it out of several.
     pub fn context<'a>(
         &'a self,
         judgement: &'a Judgement,
@@ -84,7 +85,7 @@ impl Looked {
     }
 }
 
-/// What is read: a line to a format.
+/// The supported formats, one per line.
 pub fn formats_text() -> Vec<Text> {
     let line = |(name, endings): (Text, String)| {
         if endings.is_empty() { name } else { text!("{name} ({endings})", name = name, endings = endings) }
@@ -92,7 +93,7 @@ pub fn formats_text() -> Vec<Text> {
     import::formats().into_iter().map(line).collect()
 }
 
-/// That not everything was tried, and what to do.
+/// A note that not everything was tried, and what to do about it.
 pub fn untried_text(judgement: &Judgement) -> Text {
     text!(
         "there are more hypotheses than are tried: {untried} of them and {series} pairs of series were left out. Name the series of \
@@ -102,14 +103,14 @@ pub fn untried_text(judgement: &Judgement) -> Text {
     )
 }
 
-/// Whether a setting says what to look at, and not only what it means: where it is made again the images are looked at again.
+/// Whether a setting determines what to look at, and not only what it means: when it changes, the images are searched again.
 pub fn looks(key: &str, recording: &Recording) -> bool {
-    // The offset of clocks is estimated for what a person has said of the poses.
+    // The offset of the clocks is estimated for what the user has stated about the poses.
     let is_about_clocks = matches!(key, "mode" | "pose" | "poses" | "clock_offset") && !recording.motions.is_empty();
     is_about_clocks || matches!(key, "images" | "camera" | "target_poses" | "arm" | "image_size")
 }
 
-/// Finds the target in the images. `given` is a target that a person names; without it the one that files describe is taken.
+/// Finds the target in the images. `given` is a target that the user names; without it the one that files describe is taken.
 ///
 /// # Errors
 /// [`NotUnderstood`].
@@ -231,7 +232,7 @@ impl Look<'_> {
         Ok((sights, cameras))
     }
 
-    /// What a stream shows of the target, with the camera that is taken as known; or why it is not seen.
+    /// What a stream shows of the target, with the camera that is assumed to be known; or why it is not seen.
     fn sight(
         &mut self,
         i: usize,
@@ -274,12 +275,12 @@ impl Look<'_> {
         Ok(sight.map(|sight| (sight, camera)).map_err(|why| trouble(why.into())))
     }
 
-    /// Where no image shows the target: recorded poses of it need none.
+    /// For when no image shows the target: its recorded poses need none.
     fn without_images(&mut self, target: Option<TargetSpec>, troubles: Vec<Text>) -> Result<(), NotUnderstood> {
         let recording = self.recording;
         let instead = text!("the recorded poses of the target are used, and not the images");
         if recording.tracks.iter().any(|track| track.role == Role::Target) {
-            // What the target is they do not say, and need not.
+            // They do not show what the target is, and need not.
             self.notes.extend(if target.is_some() { troubles } else { vec![instead] });
             return Ok(());
         }
@@ -289,7 +290,7 @@ impl Look<'_> {
         } else {
             text!("the files do not say what was looked at: {troubles}", troubles = troubles)
         };
-        // Whose two series are that say nothing of it, the data tell.
+        // If nothing states what their two series are of, the data decide.
         let may_be = recording.tracks.iter().filter(|track| track.reading_of.is_none());
         let has_pair = may_be.clone().count() >= 2 && may_be.clone().any(|track| track.role != Role::Robot);
         if !has_pair && recording.still.is_empty() {

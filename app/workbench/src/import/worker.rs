@@ -1,4 +1,4 @@
-//! Looks at recordings and converts them, away from the window.
+//! Looks at recordings and converts them, off the window's thread.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ pub enum ImportTask {
     Look {
         /// The recording.
         path: PathBuf,
-        /// What its files may name.
+        /// What its files may refer to.
         bounds: Bounds,
         /// How long its files may be read.
         time: Duration,
@@ -46,7 +46,7 @@ pub enum ImportTask {
         /// What was fixed.
         settings: Settings,
     },
-    /// Try the hypotheses again with other settings, of what was looked at.
+    /// Try the hypotheses again with other settings, on what was already searched.
     Judge {
         /// What was found.
         known: Arc<Found>,
@@ -57,9 +57,9 @@ pub enum ImportTask {
     Convert {
         /// What was found.
         known: Arc<Found>,
-        /// Its place.
+        /// Its index.
         hypothesis: usize,
-        /// Whether a person took it out of several.
+        /// Whether the user chose it out of several.
         is_taken: bool,
     },
     /// Make a data set of the images alone.
@@ -73,7 +73,7 @@ pub enum ImportTask {
 pub fn perform(job: &ImportJob, cancel: &CancelToken, outlet: &Outlet) {
     let number = job.number;
     let defect = |_panic| {
-        // It must not take the thread along, nor leave a person waiting.
+        // A panic must not end the thread, nor leave the user waiting.
         tracing::error!("a recording was not read by a defect of this program: report it");
         text!("it was not read because of a defect of this program: please report it")
     };
@@ -147,7 +147,7 @@ fn look(
     let progress = |done, of| outlet.report(Event::Progress { number, work: ImportWork::Looking(done, of) });
     let looked = understand::look(&opened, target, settings, &progress, cancel);
     let recording = looked.as_ref().map_or_else(|_| Arc::clone(&opened), |looked| Arc::clone(&looked.recording));
-    // Of images of a moving robot only some are left.
+    // Only some of the images of a moving robot are kept.
     let known = known.filter(|known| Arc::ptr_eq(&known.recording, &recording));
     let previews = known.map_or_else(|| Arc::new(previews(&recording)), |known| Arc::clone(&known.previews));
     let settings_used = settings.clone();

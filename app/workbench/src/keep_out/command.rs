@@ -1,4 +1,4 @@
-//! What may be wanted of the boxes that the arm keeps out of, and what is reported.
+//! Commands and events of the boxes that the arm keeps out of.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub enum Command {
 /// What has happened to the boxes that the arm keeps out of.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Event {
-    /// What the cell says stands around, now that the arm keeps out of the boxes, too; or why it does not.
+    /// The obstacles that the cell reports, now that the arm keeps out of the boxes, too; or why it does not.
     #[serde(skip)]
     Standing(Result<Arc<Surroundings>, Text>),
     /// Boxes to keep out of, from a file.

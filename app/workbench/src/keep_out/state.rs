@@ -10,32 +10,32 @@ use crate::text::Text;
 
 /// Height of a box that is drawn on the ground \[m\].
 const DRAWN_HEIGHT_M: f64 = 0.2;
-/// Least edge of a box that is drawn \[m\]: less is a slip of the hand.
+/// Shortest edge of a box that is drawn \[m\]: less is a slip of the hand.
 const LEAST_DRAWN_M: f64 = 0.01;
 
-/// The boxes, and what the cell says.
+/// The boxes, and what the cell reports.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KeepOut {
     /// As they are edited.
     pub content: KeepOutFile,
-    /// What the arm keeps to: every entry of the content that makes sense.
+    /// What the arm avoids: every valid entry of the content.
     pub around: Arc<Surroundings>,
-    /// What of the content makes no sense.
+    /// What is invalid in the content.
     pub fault: Option<Text>,
     /// Why the arm keeps out of none of them.
     pub unkept: Option<Text>,
-    /// Where they are kept; nowhere where that cannot be read or the system has no folder for it.
+    /// Where they are kept; nowhere if that cannot be read or the system has no folder for it.
     pub file: Option<PathBuf>,
-    /// Why they are kept nowhere.
+    /// Why they are not saved.
     pub unsaved: Option<Text>,
-    /// Since when \[s\] they are to be written.
+    /// Since when \[s\] they are waiting to be written.
     pub unwritten_since_s: Option<f64>,
-    /// What the cell says stands around; `None` before it has said so.
+    /// The obstacles that the cell reports; `None` before it has reported them.
     pub scene_obstacles: Option<Arc<Surroundings>>,
 }
 
 impl KeepOut {
-    /// Takes in other boxes. An entry that makes no sense is shown and not kept to, all others are.
+    /// Takes in other boxes. An invalid entry is shown but ignored, all others are used.
     pub fn set(&mut self, content: KeepOutFile) {
         let file = self.file.as_deref().unwrap_or_else(|| Path::new("keep-out boxes"));
         self.fault = content.surroundings(file).err().map(|error| match error {
@@ -54,7 +54,7 @@ fn free_name(boxes: &[KeepOutBox]) -> String {
     (1..=boxes.len() + 1).map(|number| format!("box {number}")).find(is_free).unwrap_or_default()
 }
 
-/// With a box more, over a rectangle of the ground from one corner to the opposite one \[m\]; `None` where that is hardly one.
+/// With one more box, over a rectangle of the ground from one corner to the opposite one \[m\]; `None` if that is too small.
 pub fn with_drawn(content: &KeepOutFile, from: [f64; 2], to: [f64; 2]) -> Option<KeepOutFile> {
     let edge = |axis: usize| (to[axis] - from[axis]).abs();
     if edge(0) < LEAST_DRAWN_M || edge(1) < LEAST_DRAWN_M {
@@ -85,7 +85,7 @@ mod tests {
         assert_eq!((keep_out.around.obstacles.len(), keep_out.fault.is_some()), (1, false));
         let [size, centre] = [keep_out.content.boxes[0].size_m, keep_out.content.boxes[0].centre_m];
         assert_eq!((size, centre), ([0.3, 0.4, 0.2], [0.35, 0.1, 0.1]));
-        // A name is being typed, and another box is drawn meanwhile.
+        // A name is being typed while another box is drawn.
         let mut two = with_drawn(&one, [0.0, 0.5], [0.1, 0.7]).expect("a rectangle");
         two.boxes[0].size_m[1] = 0.0;
         two.boxes[1].name.clear();

@@ -1,4 +1,4 @@
-//! Changes of the boxes: the arm keeps to them from its next motion on, and they are kept in a file.
+//! Changes of the boxes: the arm avoids them from its next motion on, and they are kept in a file.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use handeye_wording::text;
 /// How long after the last change they are written \[s\]: a value that is dragged changes with every frame.
 const WRITTEN_AFTER_S: f64 = 0.5;
 
-/// What a file says at the start; nothing where there is none. One that cannot be used is left as it is.
+/// What a file contains at the start; nothing if it does not exist. One that cannot be used is left as it is.
 pub(crate) fn opened(file: Option<PathBuf>) -> (KeepOut, Option<Text>) {
     let Some(file) = file else { return (KeepOut::default(), None) };
     match KeepOutFile::read(&file) {
@@ -50,7 +50,7 @@ pub(crate) fn apply(model: &mut Model, workers: &Workers, desk: &SessionThreads,
     }
 }
 
-/// Takes in what stands around.
+/// Takes in the obstacles.
 pub(crate) fn absorb(model: &mut Model, workers: &Workers, event: Event) {
     match event {
         Event::Standing(scene_obstacles) => surroundings_found(model, scene_obstacles),
@@ -64,12 +64,12 @@ fn set_keep_out(model: &mut Model, workers: &Workers, content: KeepOutFile) {
     send_keep_out(model, workers);
 }
 
-/// Has the arm keep to them.
+/// Makes the arm avoid them.
 pub(crate) fn send_keep_out(model: &Model, workers: &Workers) {
     workers.keep_out(Arc::clone(&model.keep_out.around));
 }
 
-/// Whether the arm keeps out of them, and of what else. That it does not is reported once.
+/// Whether the arm keeps out of them, and of what else. If it does not, that is reported once.
 fn surroundings_found(model: &mut Model, scene_obstacles: Result<Arc<Surroundings>, Text>) {
     let keep_out = &mut model.keep_out;
     match scene_obstacles {
@@ -106,7 +106,7 @@ fn export_keep_out(model: &mut Model, desk: &SessionThreads, file: PathBuf) {
     model.notify_if_refused(text!("The boxes were not written"), asked);
 }
 
-/// Keeps them in their file once nobody is changing them any longer, or at once.
+/// Writes them to their file once nobody is changing them any longer, or at once.
 pub(crate) fn keep_keep_out(model: &mut Model, desk: &SessionThreads, at_once: bool) {
     let keep_out = &mut model.keep_out;
     let Some(since_s) = keep_out.unwritten_since_s else { return };
@@ -145,7 +145,7 @@ mod tests {
         let (again, reported) = opened(Some(file.clone()));
         assert_eq!((&again.content, again.around.obstacles.len(), reported), (&content, 1, None));
 
-        // One entry that makes no sense is shown, and takes no other one along.
+        // One invalid entry is shown, and does not affect the others.
         let mut faulty = again.content.clone();
         faulty.boxes.push(faulty.boxes[0].clone());
         faulty.boxes[1].size_m[0] = -1.0;

@@ -1,4 +1,4 @@
-//! What may be wanted of the live images, and what is reported.
+//! Commands and events of the live images.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub enum Command {
     SetOverlays(Overlays),
     /// Which part of the images is shown, and how large.
     SetViewport(Viewport),
-    /// The pointer is over a pixel of the images, or over none.
+    /// The pointer is over a pixel of the images, or over no pixel.
     PointAt(Option<ImagePoint>),
     /// Measure the point at a pixel of the image in base coordinates.
     Pick(Option<ImagePoint>),
@@ -31,7 +31,7 @@ pub enum Command {
 pub enum Event {
     /// New images.
     Frame {
-        /// Their circumstances.
+        /// Their metadata.
         info: FrameInfo,
         /// Frames so far that were never shown.
         dropped: u64,

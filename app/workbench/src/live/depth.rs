@@ -2,10 +2,10 @@
 
 use handeye_geometry::depth::{DepthImage, DepthSample};
 
-/// Every so manyth pixel is enough to find the range. A prime, so that it does not fall into step with the columns.
+/// Every Nth pixel is enough to find the range. A prime, so that it does not fall into step with the columns.
 const RANGE_STRIDE: usize = 7;
 
-/// Share of the depths at each end that the range may leave out: single wild pixels must not set it.
+/// Share of the depths at each end that the range may leave out: single outlier pixels must not set it.
 const RANGE_TAIL: f64 = 0.01;
 
 /// The range ends at multiples of this \[m\], so that it does not flicker.
@@ -18,7 +18,7 @@ const RANGE_MARGIN: f32 = 0.08;
 /// The shortest range [m]: a flat wall is not stretched over the whole map.
 const SHORTEST_RANGE_M: f32 = 0.10;
 
-/// A range that covers the image may be so many times as long as it needs to be before it is made shorter.
+/// A range that covers the image may be this many times as long as needed before it is made shorter.
 const LARGEST_EXCESS: f32 = 1.5;
 
 /// The depths \[m\] that an image has, rounded outwards. `previous` is kept while it still fits, because a colour map

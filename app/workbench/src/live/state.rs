@@ -14,17 +14,17 @@ use serde::{Deserialize, Serialize};
 use crate::scene::{AZIMUTH_RAD, ELEVATION_RAD};
 use crate::text::Text;
 
-/// What is known about a frame besides its pixels.
+/// What is known about a frame in addition to its pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameInfo {
     /// Counts the frames since the start of the program; grows with every frame that the camera worker takes.
     pub number: u64,
     /// Simulated time of the images \[s\]; of images from a driver, time of the workbench.
     pub sim_time_s: f64,
-    /// How far they and pose and joints may be apart \[s\]: nothing where all is of one instant.
+    /// How far they and the pose and joints may be apart \[s\]: zero if all are from one instant.
     pub image_age_s: f64,
-    /// How far the tip may have moved meanwhile \[m\], at its speed since the images before; a turn counts as at a metre from
-    /// the tip.
+    /// How far the tip may have moved meanwhile \[m\], at its speed since the images before; a rotation counts as at one
+    /// metre from the tip.
     #[serde(default)]
     pub image_off_m: f64,
     /// When they arrived.
@@ -35,17 +35,17 @@ pub struct FrameInfo {
     pub depth_range_m: [f32; 2],
     /// The sensor's far plane \[m\]: depths there are no surface.
     pub far_plane_m: f32,
-    /// The tip as the controller reported it at the instant of the images; not known where the states of a robot leave a
-    /// gap, or nobody has typed it.
+    /// The tip as the controller reported it at the instant of the images; not known if the states of a robot leave a
+    /// gap, or it has not been typed.
     pub base_from_tip: Option<Pose<Base, Tip>>,
     /// Why that is not known.
     #[serde(default)]
     pub no_pose: Option<Box<Text>>,
-    /// The joints at the same instant \[rad\]; none where the robot does not report them.
+    /// The joints at the same instant \[rad\]; empty where the robot does not report them.
     pub joints_rad: JointValues,
-    /// Where the board was at that instant, if the cell publishes it; only ever compared with.
+    /// Where the board was at that instant, if the cell publishes it; only used for comparison.
     pub base_from_target_true: Option<Pose<Base, Target>>,
-    /// Of a robot and a camera that are two drivers: what is added to a stamp of the camera to have one of the robot, and how well
+    /// For a robot and a camera that are two drivers: what is added to a stamp of the camera to get one of the robot, and how well
     /// that is known \[s\].
     pub clocks: Option<[f64; 2]>,
 }
@@ -115,7 +115,7 @@ impl FrameImages {
     }
 }
 
-/// A pair of images with its circumstances.
+/// A pair of images with its metadata.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveFrame {
     /// When, how often, which range.
@@ -142,7 +142,7 @@ pub struct Overlays {
     pub corners: bool,
     /// The axes of the board.
     pub axes: bool,
-    /// The board where robot pose and calibration say that it is.
+    /// The board where robot pose and calibration predict it.
     pub predicted: bool,
     /// Outlines of the boards of past captures.
     pub coverage: bool,
@@ -171,7 +171,7 @@ impl Default for Viewport {
     }
 }
 
-/// From where the 3D pane looks at the cell: an eye that circles about a point, with z of the base upwards.
+/// The viewpoint of the 3D pane: an eye that orbits a point, with z of the base upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SceneView {
     /// The point in the middle of the pane, in the base \[m\].
@@ -185,7 +185,7 @@ pub struct SceneView {
 }
 
 impl Default for SceneView {
-    /// Obliquely from above, with an arm of this size and what it reaches in view.
+    /// Obliquely from above, with an arm of this size and its reach in view.
     fn default() -> Self {
         Self { centre_m: [0.0, -0.1, 0.45], azimuth_rad: AZIMUTH_RAD, elevation_rad: ELEVATION_RAD, distance_m: 1.9 }
     }
@@ -195,9 +195,9 @@ impl Default for SceneView {
 #[derive(Debug, Clone)]
 pub struct PickedPoint {
     pub pixel: ImagePoint,
-    /// By the tip pose as it is reported: for commands as they are.
+    /// With the tip pose as it is reported: for uncorrected commands.
     pub as_reported: MeasuredTwice,
-    /// By the tip pose corrected for the errors of the arm: for corrected commands. `None` where these are not known.
+    /// With the tip pose corrected for the errors of the arm: for corrected commands. `None` if these are not known.
     pub corrected: Option<MeasuredTwice>,
 }
 
@@ -206,7 +206,7 @@ pub struct PickedPoint {
 pub struct MeasuredTwice {
     /// From the depth at the pixel; or why not.
     pub from_depth: Result<MeasuredPoint, Text>,
-    /// Where the ray through the pixel meets the board as PnP sees it; or why not.
+    /// Where the ray through the pixel meets the board as estimated by PnP; or why not.
     pub from_board: Result<MeasuredPoint, Text>,
 }
 

@@ -1,4 +1,4 @@
-//! How the images are looked at, and points that are measured in them.
+//! How the images are looked at, and points measured in them.
 
 use handeye_estimate::verify::{Predictor, TipAt};
 use handeye_geometry::depth::{ColourMap, DepthSample};
@@ -32,7 +32,7 @@ pub(crate) fn absorb(model: &mut Model, workers: &Workers, numbers: &mut Numbers
     match event {
         Event::Frame { info, dropped, images } => {
             model.dropped_frames = dropped;
-            // A frame out of a log has no pixels, and nothing to show.
+            // A frame from a log has no pixels, and nothing to show.
             if let Some(images) = images {
                 model.frame = Some(LiveFrame { info, images });
             }
@@ -81,7 +81,7 @@ fn measure(model: &Model, pixel: ImagePoint) -> Option<PickedPoint> {
     Some(PickedPoint { pixel, as_reported, corrected })
 }
 
-/// By a calibration and the tip that goes with it, of a pose of the robot and its joints.
+/// With a calibration and the tip that goes with it, for a pose of the robot and its joints.
 fn measured(
     model: &Model,
     frame: &LiveFrame,
@@ -99,8 +99,8 @@ fn measured(
         },
         DepthSample::Far | DepthSample::Invalid => Err(text!("there is no depth at this pixel")),
     };
-    // The board and the tip of the same image: the newest frame may be a later one. The board is as large and as
-    // bent as the calibration found it.
+    // The board and the tip of the same image: the newest frame may be a later one. The board has the size and bend
+    // that the calibration found.
     let seen = model.detection.as_ref().and_then(|it| {
         let board = calibrated.board(&model.document().meta.target);
         let seen = calibrated.seen(&board, (it.corners.as_ref()?, None), &it.camera_from_target?)?;
@@ -141,7 +141,7 @@ mod tests {
         }
         let [reported, really] = twice.map(|measured| *measured.from_depth.as_ref().expect("measured"));
         assert!((reported.in_base.point() - really.in_base.point()).norm() > 1e-4);
-        // What is not known of the arm comes on top of what is not known of the camera.
+        // The uncertainty of the arm is added to that of the camera.
         let [reported, really] = [reported, really].map(|point| point.covariance_in_base.expect("stated").trace());
         assert!(really > reported, "{really} {reported}");
     }

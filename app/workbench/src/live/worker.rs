@@ -15,7 +15,7 @@ use crate::worker::rate::RateMeter;
 use handeye_link::{CameraPort, Cell, Connected, Newest, PortError, RawFrame};
 use handeye_wording::text;
 
-/// Rest between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
+/// Pause between two looks at the clock of the cell: a third of the pass of a simulation at its usual 50 ms.
 const PERIOD: Duration = Duration::from_millis(15);
 
 /// What the camera worker can be asked for.
@@ -27,7 +27,7 @@ pub enum CameraTask {
     SetDepthColours(ColourMap),
 }
 
-/// The duty of the camera worker.
+/// The job of the camera worker.
 pub struct Camera {
     frames: Arc<LatestSlot<LiveFrame>>,
     for_vision: Arc<Tap<LiveFrame>>,
@@ -42,7 +42,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// With the places that it shares with the application and with the vision thread.
+    /// With the slots that it shares with the application and with the vision thread.
     pub fn new(view: &ViewSettings, frames: Arc<LatestSlot<LiveFrame>>, for_vision: Arc<Tap<LiveFrame>>) -> Self {
         Self {
             frames,
@@ -57,7 +57,8 @@ impl Camera {
         }
     }
 
-    /// How fast the tip moves since the images before, where both say where it was. At rest it is the noise of the encoders.
+    /// How fast the tip has moved since the previous images, if its pose is known for both. At rest it is the noise of the
+    /// encoders.
     fn speed_m_s(&mut self, raw: &RawFrame) -> f64 {
         const LEVER_M: f64 = 1.0;
         let now = raw.base_from_tip.map(|pose| (raw.sim_time_s, pose));
@@ -138,7 +139,7 @@ impl Duty for Camera {
             CameraTask::SetDepthScale(scale) => self.scale = scale,
             CameraTask::SetDepthColours(colours) => self.colours = colours,
         }
-        // A resting simulation would otherwise show the old colours until it runs.
+        // A paused simulation would otherwise show the old colours until it runs.
         self.seen_sim_time_s = None;
         Ok(())
     }
@@ -153,7 +154,7 @@ mod tests {
 
     use super::*;
 
-    /// Gives what it is told to, the last one first.
+    /// Returns what it is given, the last one first.
     struct Scripted(Vec<Newest>);
 
     impl CameraPort for Scripted {
@@ -180,7 +181,7 @@ mod tests {
         }))
     }
 
-    /// A camera that answers is that of a simulation that rests; one that does not is slow, or gone.
+    /// A camera that answers belongs to a paused simulation; one that does not is slow, or gone.
     #[test]
     fn a_camera_is_heard_when_it_answers_and_the_tip_may_be_as_far_off_as_it_moves_meanwhile() {
         let (frames, tap) = (Arc::<LatestSlot<LiveFrame>>::default(), Arc::new(Tap::new().0));

@@ -1,4 +1,4 @@
-//! What may be wanted of messages, and what is reported.
+//! Commands and events of messages.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use crate::text::Text;
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
-    /// A message needs no more attention.
+    /// The user has closed a message.
     Dismiss(u64),
 }
 

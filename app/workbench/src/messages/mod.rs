@@ -1,4 +1,4 @@
-//! What the program says: log, toasts, the banner.
+//! What the program reports: log, toasts, the banner.
 
 pub mod command;
 pub(crate) mod state;

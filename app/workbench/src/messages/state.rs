@@ -7,40 +7,41 @@ use serde::{Deserialize, Serialize};
 use crate::shell::state::Pane;
 use crate::text::{Language, Text};
 
-/// Messages that are kept: a long day of work, and not a leak.
+/// Messages that are kept: enough for a long day of work, but bounded.
 const KEPT: usize = 2000;
 
-/// Longest message \[bytes\]: whoever reads it has read enough, and to lay text out takes time.
+/// Longest message \[bytes\]: nobody reads more, and text layout takes time.
 const LONGEST: usize = 4000;
 
 /// How much a message matters, least first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
-    /// It went as asked.
+    /// Success, as requested.
     Info,
-    /// Not as asked, or soon not.
+    /// Not as requested, or soon not.
     Warning,
     /// It failed.
     Error,
 }
 
-/// Where a message stands. The log has all of them; besides that each stands in one place, so that nothing is reported twice.
+/// Where a message is shown. The log has all of them; apart from that each is shown in one place, so that nothing is reported
+/// twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Home {
     /// The log alone: it is reported for those who look for it.
     Log,
-    /// The line at the bottom: it went as asked.
+    /// The line at the bottom: for success, as requested.
     StatusLine,
-    /// Below the steps, for a while or until it is put aside.
+    /// Below the steps, for a while or until it is closed.
     Toast,
-    /// A pane, which says it for as long as it is so. Below the steps only while that pane is not in front.
+    /// A pane, which shows it for as long as it applies. Below the steps only while that pane is not in front.
     Pane(Pane),
     /// The card below the steps, or the place of the image, until the connection is there.
     Connection,
 }
 
 impl Home {
-    /// Of what has no other place.
+    /// For what has no other place.
     pub(crate) fn of(severity: Severity) -> Self {
         match severity {
             Severity::Info => Self::StatusLine,
@@ -58,13 +59,13 @@ pub struct Message {
     pub severity: Severity,
     /// The words.
     pub text: Text,
-    /// Where it stands besides the log.
+    /// Where it is shown apart from the log.
     pub home: Home,
     /// When it happened, for the last time.
     pub at_s: f64,
     /// How often it was reported in a row.
     pub times: u32,
-    /// Whether the user has put it aside.
+    /// Whether the user has closed it.
     pub dismissed: bool,
 }
 
@@ -76,8 +77,8 @@ pub struct Messages {
 }
 
 impl Messages {
-    /// Says something where messages of its kind stand. The same words twice in a row are one message that was reported
-    /// twice.
+    /// Reports something where messages of its kind are shown. The same words twice in a row are one message that was
+    /// reported twice.
     pub fn notify(&mut self, severity: Severity, text: Text, at_s: f64) {
         self.notify_at(Home::of(severity), severity, text, at_s);
     }
@@ -98,23 +99,23 @@ impl Messages {
         self.next += 1;
     }
 
-    /// The last thing that happened.
+    /// The newest message.
     pub fn newest(&self) -> Option<&Message> {
         self.kept.back()
     }
 
-    /// What the status line says: the last thing that went as asked, until something else happens.
+    /// What the status line shows: the last success, until something else happens.
     pub fn status_line(&self) -> Option<&Message> {
         self.kept.iter().next_back().filter(|message| message.home == Home::StatusLine)
     }
 
-    /// What a pane has to say that is still so: the last warning or error that has its place there.
+    /// What a pane has to show that still applies: the last warning or error that has its place there.
     pub fn standing_in(&self, pane: Pane) -> Option<&Message> {
         let last = self.kept.iter().rev().find(|message| message.home == Home::Pane(pane))?;
         (last.severity != Severity::Info && !last.dismissed).then_some(last)
     }
 
-    /// What stands in a pane is no longer so.
+    /// What is shown in a pane no longer applies.
     pub(crate) fn is_over_in(&mut self, pane: Pane) {
         for message in self.kept.iter_mut().filter(|message| message.home == Home::Pane(pane)) {
             message.dismissed = true;
@@ -126,7 +127,7 @@ impl Messages {
         self.kept.iter()
     }
 
-    /// Puts one aside; it stays in the log.
+    /// Closes one; it stays in the log.
     pub fn dismiss(&mut self, number: u64) {
         if let Some(message) = self.kept.iter_mut().find(|message| message.number == number) {
             message.dismissed = true;

@@ -1,4 +1,4 @@
-//! What the user is told.
+//! Notifications for the user.
 
 use super::command::{Command, Event};
 use crate::model::{Home, Model, Pane, Severity};
@@ -12,19 +12,19 @@ pub(crate) fn apply(model: &mut Model, command: Command) {
     }
 }
 
-/// Takes in what there is to tell.
+/// Takes in a notification.
 pub(crate) fn absorb(model: &mut Model, event: Event) {
     let Event::Notice { severity, text } = event;
     model.notify(severity, text);
 }
 
 impl Model {
-    /// Shows what a pane says for as long as it is so, and keeps it.
+    /// Shows a message in a pane for as long as it applies, and keeps it.
     pub(crate) fn notify_in(&mut self, pane: Pane, severity: Severity, text: Text) {
         self.messages.notify_at(Home::Pane(pane), severity, text, self.now_s);
     }
 
-    /// Keeps what the card below the steps says of the connection.
+    /// Keeps what the card below the steps shows about the connection.
     pub(crate) fn notify_connection(&mut self, severity: Severity, text: Text) {
         self.messages.notify_at(Home::Connection, severity, text, self.now_s);
     }
@@ -34,7 +34,7 @@ impl Model {
         self.messages.notify(severity, text, self.now_s);
     }
 
-    /// Tells the user when a worker did not take a request.
+    /// Notifies the user when a worker did not take a request.
     pub(crate) fn notify_if_refused<Refused>(&mut self, failure: Text, asked: Result<(), Refused>) {
         if let Err(_refused) = asked {
             let text = text!("{failure}: the connection does not answer; wait until it is back", failure = failure);

@@ -56,7 +56,7 @@ use crate::motion::way::Way;
 use crate::session::start;
 use crate::text::{Language, Text};
 
-/// Old enough \[s\] to say so: an image or a reading of the robot that should come many times a second.
+/// Age \[s\] from which it is reported: of an image or a reading of the robot that should come many times a second.
 pub const STALE_AFTER_S: f64 = 1.0;
 
 /// The connections to the cell.
@@ -112,7 +112,7 @@ pub enum LinkState {
         /// How many times it was tried since, this one included.
         attempt: u32,
     },
-    /// The user wants that it is not tried.
+    /// The user does not want it to be tried.
     Resting {
         /// Why there is no connection.
         why: Text,
@@ -183,7 +183,7 @@ pub struct ViewSettings {
     pub confirm_moves: Option<bool>,
     /// Light or dark.
     pub theme: ThemeChoice,
-    /// Of all words.
+    /// Language of all texts.
     pub language: Language,
     /// How rotations are written.
     pub rotation: RotationFormat,
@@ -196,7 +196,7 @@ pub struct ViewSettings {
 pub struct Goal(pub f64);
 
 impl Default for Goal {
-    /// That of guided capture, in the window and on the command line.
+    /// The same as for guided capture, in the window and on the command line.
     fn default() -> Self {
         Self(GuidedOptions::default().goal_m)
     }
@@ -217,11 +217,11 @@ pub struct Model {
     pub camera: LinkState,
     /// The connection for motions.
     pub mover: LinkState,
-    /// What is known of the cell since it was connected.
+    /// What is known about the cell since it was connected.
     pub cell: Option<CellFacts>,
     /// What the arm does, as far as this program moves it.
     pub motion: Motion,
-    /// The robot, as it was when it was last heard of.
+    /// The robot, as last reported.
     pub robot: Option<RobotState>,
     /// When that was.
     pub robot_read_s: Option<f64>,
@@ -231,7 +231,7 @@ pub struct Model {
     pub dropped_frames: u64,
     /// A stop was pressed and the robot has not confirmed it yet.
     pub stop_pending: bool,
-    /// The arm was told to stop, and its states have not said yet that it stands.
+    /// The arm was commanded to stop, and its states do not show yet that it is at rest.
     pub stopping: Option<Stopping>,
     /// The pixel under the pointer, in both images.
     pub cursor: Option<ImagePoint>,
@@ -259,17 +259,17 @@ pub struct Model {
     pub sequence: Option<PoseSequence>,
     /// Whether that sequence is still under way.
     pub sequence_runs: bool,
-    /// Whether a person has let the arm go since that sequence began or went on.
+    /// Whether the user has allowed a move since that sequence began or continued.
     pub let_go: bool,
-    /// The move that waits until a person lets the arm go.
+    /// The move that waits until the user allows it.
     pub asked: Option<PendingMove>,
-    /// Where the arm stood when the cell was connected.
+    /// Where the arm was when the cell was connected.
     pub home: Option<JointValues>,
-    /// Counts the cells that were connected to.
+    /// Counts the connected cells.
     pub cells: u64,
     /// The poses of a sequence are being planned.
     pub planning: bool,
-    /// A person is guided from view to view.
+    /// The user is guided from view to view.
     pub by_hand: Option<Box<ByHand>>,
     /// The recording that is being imported.
     pub import: Option<Box<ImportState>>,
@@ -278,7 +278,7 @@ pub struct Model {
     pub opening: bool,
     /// Where new sessions go.
     pub sessions: PathBuf,
-    /// What was seen in its captures; `None` for an image that cannot be read. One that is not here is being looked at.
+    /// What was seen in its captures; `None` for an image that cannot be read. One that is not here is being searched.
     pub observed: BTreeMap<CaptureId, Option<Arc<Observed>>>,
     /// Captures that are selected, the last one last.
     pub selection: Vec<CaptureId>,
@@ -286,7 +286,7 @@ pub struct Model {
     pub review: Option<Review>,
     /// The solver and its newest answer.
     pub solve: SolveState,
-    /// Which answer is asked for.
+    /// Which answer is requested.
     pub method: String,
     /// Whether it uses every view and corner, also those that do not fit the others.
     pub keep_outliers: bool,
@@ -321,15 +321,15 @@ pub struct Model {
 }
 
 impl Model {
-    /// How a joint, counted from 0 at the base, moves, by the cell or else by the session. As long as neither says so it
-    /// turns.
+    /// How a joint, counted from 0 at the base, moves, as given by the cell or else by the session. If neither does, it
+    /// is revolute.
     pub fn joint_kind(&self, index: usize) -> JointKind {
         let of_cell = self.cell.as_ref().map(|cell| cell.joints.get(index).map(|joint| joint.kind));
         let of_session = || self.document().meta.joint_kinds.as_ref()?.get(index).copied();
         of_cell.unwrap_or_else(of_session).unwrap_or(JointKind::Revolute)
     }
 
-    /// Values of all joints as a person reads them, each with its unit.
+    /// Values of all joints as displayed, each with its unit.
     pub fn joints_text(&self, joints: &[f64]) -> String {
         let reported =
             |(i, &value): (usize, &f64)| format!("{:.1}", self.joint_kind(i).quantity(value)).replace('-', "−");
@@ -419,13 +419,13 @@ impl Model {
         self.frame.as_ref().map(|frame| (self.now_s - frame.info.received_s).max(0.0))
     }
 
-    /// Whether what is known of the robot is so now, and not how it was when it was last read.
+    /// Whether what is known about the robot is current, and not from when it was last read.
     pub fn is_robot_live(&self) -> bool {
         let is_new = |read_s: f64| self.now_s - read_s <= STALE_AFTER_S;
         self.control.is_connected() && self.robot.is_some() && self.robot_read_s.is_none_or(is_new)
     }
 
-    /// Whether a stop has something to break off that this program does.
+    /// Whether there is something under way in this program that a stop would end.
     pub fn is_under_way(&self) -> bool {
         let follows = !matches!(self.track.follow, FollowStatus::Off | FollowStatus::Ended(_));
         self.motion != Motion::Idle || self.sequence_runs || self.planning || self.capture.is_some() || follows
@@ -441,13 +441,14 @@ impl Model {
         self.observed.get(&id)?.as_deref()
     }
 
-    /// The camera: as calibrated, or else as its settings say.
+    /// The camera: as calibrated, or else from its settings.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
         let calibrated = self.solve.solved.as_ref().and_then(|solved| solved.calibration.intrinsics());
         calibrated.or_else(|| self.cell.as_ref()?.nominal_intrinsics)
     }
 
-    /// The camera on the tip, by the newest calibration; `None` without one, or for a camera beside the robot.
+    /// The camera on the tip, by the newest calibration; `None` without one, or for a camera next to the robot (eye to
+    /// hand).
     pub(crate) fn tip_from_camera(&self) -> Option<Pose<Tip, Camera>> {
         match self.calibrated()?.hand_eye {
             HandEye::EyeInHand { tip_from_camera, .. } => Some(tip_from_camera),
@@ -455,32 +456,32 @@ impl Model {
         }
     }
 
-    /// The newest calibration as what predicts and measures.
+    /// The newest calibration, for predicting and measuring.
     pub fn calibrated(&self) -> Option<&Predictor> {
         self.solve.solved.as_ref()?.calibrated.as_ref()
     }
 
-    /// Poses that guided capture goes to, the next one first; none while it does not run.
+    /// Poses that guided capture goes to, the next one first; empty while it does not run.
     pub fn planned_poses(&self) -> &[Proposal] {
         let sequence = self.sequence.as_ref().filter(|_| self.sequence_runs);
         sequence.and_then(|sequence| sequence.guided.as_deref()).map_or(&[], |guided| &guided.ahead)
     }
 
-    /// Whether there may be a real arm: anywhere but in the built-in cell, also behind an address.
+    /// Whether the arm may be real: anywhere but in the built-in cell, also behind an address.
     pub(crate) fn may_be_real(&self) -> bool {
         !self.source.is_built_in()
     }
 
-    /// Whether each move of the arm to a chosen pose waits to be confirmed: as the user wants it, or else wherever there may be a
-    /// real arm.
+    /// Whether each move of the arm to a chosen pose waits to be confirmed: as the user wants it, or else wherever the arm may be
+    /// real.
     pub fn confirms_moves(&self) -> bool {
         self.view.confirm_moves.unwrap_or(self.may_be_real())
     }
 
-    /// Whether a move to the next pose of a sequence, or to a place that somebody chose by its name, waits until a person has seen
-    /// how far it is. Where there may be a real arm the first one always does.
+    /// Whether a move to the next pose of a sequence, or to a place that was chosen by its name, waits until the user has seen how
+    /// far it is. Where the arm may be real the first one always does.
     pub(crate) fn asks_before(&self, goal: &MotionGoal) -> bool {
-        // An arm that is only read refuses with the reason, and one that is there does not move.
+        // An arm that is read-only refuses with the reason, and one that is already there does not move.
         if !self.is_armed() || Way::to(goal, self).is_some_and(|way| way.is_none()) {
             return false;
         }
@@ -488,7 +489,7 @@ impl Model {
         let is_first = sequence.is_none() || !self.let_go;
         let each = match sequence {
             Some(sequence) if sequence.planned.is_some() => self.confirms_moves(),
-            // A person has been at taught poses.
+            // The user has been at taught poses.
             Some(_) => self.view.confirm_moves == Some(true),
             None => false,
         };
@@ -496,7 +497,7 @@ impl Model {
     }
 
     /// Share of its fastest speed at which the arm moves: as the user wants it, or else a quarter, and half in the built-in
-    /// cell, because behind an address there may be a real arm.
+    /// cell, because an arm behind an address may be real.
     pub fn speed(&self) -> f64 {
         let usual = if self.may_be_real() { 0.25 } else { 0.5 };
         self.view.jog.speed.unwrap_or(usual)
@@ -507,7 +508,7 @@ impl Model {
         self.cell.as_ref().map_or(Moves::Freely, |cell| cell.moves)
     }
 
-    /// Whether the program may choose poses and drive the arm to them, once its chain of joints is known.
+    /// Whether the program may choose poses and move the arm to them, once its chain of joints is known.
     pub fn takes_chosen_poses(&self) -> bool {
         match self.moves() {
             Moves::Freely => true,
@@ -518,12 +519,12 @@ impl Model {
         }
     }
 
-    /// Whether the arm may be moved, as far as a person has to allow it.
+    /// Whether the arm may be moved, as far as the user has to allow it.
     pub fn is_armed(&self) -> bool {
         !matches!(self.moves(), Moves::OnceArmed { .. }) || self.robot.as_ref().is_some_and(|robot| robot.is_armed)
     }
 
-    /// How far one press of a jog button goes: a robot that moves in steps only has none that is held.
+    /// How far one press of a jog button moves: a robot that only moves in steps has no button to hold.
     pub fn jog_step(&self) -> JogStep {
         match (self.view.jog.step, self.moves()) {
             (JogStep::Hold, Moves::OnceArmed { .. }) => JogStep::Step { metres: 1e-3, radians: 1_f64.to_radians() },

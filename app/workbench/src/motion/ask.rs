@@ -1,5 +1,5 @@
-//! Moves that wait until a person has seen how far they are and lets the arm go: of every sequence, to a place that somebody chose by
-//! its name, and home.
+//! Moves that wait until the user has seen how far they are and allows them: of every sequence, to a place that was chosen by its
+//! name, and home.
 
 use crate::app::Context;
 use crate::guided::update::{guided_chooses_anew, guided_skips};
@@ -9,7 +9,7 @@ use crate::taught::sequence::end_stop;
 use crate::text::Text;
 use handeye_wording::text;
 
-/// Moves the arm there, once a person lets it where that has to be asked.
+/// Moves the arm there, once the user allows it where confirmation is needed.
 pub(crate) fn set_out(cx: &mut Context, goal: MotionGoal, what: Text) {
     if cx.model.asks_before(&goal) {
         cx.model.messages.is_over_in(Pane::Jog);
@@ -19,7 +19,7 @@ pub(crate) fn set_out(cx: &mut Context, goal: MotionGoal, what: Text) {
     }
 }
 
-/// Whether somebody may send the arm somewhere now; a sequence would take the end of that motion for that of its own.
+/// Whether the user may send the arm somewhere now; a sequence would take the end of that motion for that of its own.
 pub(crate) fn may_set_out(model: &mut Model) -> bool {
     if model.sequence_runs {
         model.notify_in(
@@ -31,7 +31,7 @@ pub(crate) fn may_set_out(model: &mut Model) -> bool {
     !model.sequence_runs
 }
 
-/// A person lets the arm go.
+/// The user allows the move.
 pub(crate) fn confirm_move(cx: &mut Context) {
     let Some(PendingMove { goal, what }) = cx.model.asked.take() else { return };
     if guided_chooses_anew(&mut cx.model) {
@@ -41,7 +41,7 @@ pub(crate) fn confirm_move(cx: &mut Context) {
     start_motion(cx, goal, what);
 }
 
-/// A person leaves the move out: a sequence goes on with another pose.
+/// The user skips the move: a sequence continues with another pose.
 pub(crate) fn skip_move(cx: &mut Context) {
     if cx.model.asked.take().is_none() || guided_skips(cx) {
         return;
@@ -51,7 +51,7 @@ pub(crate) fn skip_move(cx: &mut Context) {
     }
 }
 
-/// Whether every move to a chosen pose waits. One that waits now begins where that is no longer wanted.
+/// Whether every move to a chosen pose waits. A waiting one begins if that is no longer wanted.
 pub(crate) fn set_confirm_moves(cx: &mut Context, confirm: bool) {
     cx.model.view.confirm_moves = Some(confirm);
     if cx.model.asked.as_ref().is_some_and(|asked| !cx.model.asks_before(&asked.goal)) {
@@ -59,7 +59,7 @@ pub(crate) fn set_confirm_moves(cx: &mut Context, confirm: bool) {
     }
 }
 
-/// To where the arm stood when the cell was connected.
+/// To where the arm was when the cell was connected.
 pub(crate) fn go_home(cx: &mut Context) {
     let Some(home) = cx.model.home else {
         return cx.model.notify(Severity::Warning, text!("The position of the arm is not known: connect first"));

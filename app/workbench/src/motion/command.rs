@@ -1,4 +1,4 @@
-//! What may be wanted of moving the arm, and what is reported.
+//! Commands and events of moving the arm.
 
 use handeye_geometry::frames::{Base, Pose, Tip};
 use handeye_session::CaptureId;
@@ -12,7 +12,7 @@ use crate::text::Text;
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
-    /// Have the arm stay where it is, now.
+    /// Stop the arm where it is, now.
     Stop,
     /// Move the arm to a place, which the words name.
     Move {
@@ -21,9 +21,9 @@ pub enum Command {
         /// In words.
         what: Text,
     },
-    /// Move the tip to where it really is at this pose, by the errors of the arm that the calibration found.
+    /// Move the tip so that it really is at this pose, allowing for the errors of the arm that the calibration found.
     MoveCorrected {
-        /// Where the tip shall be.
+        /// Where the tip should be.
         base_from_tip: Pose<Base, Tip>,
         /// In words.
         what: Text,
@@ -36,13 +36,13 @@ pub enum Command {
     JogReleased,
     /// How the tip is jogged.
     SetJog(JogSettings),
-    /// Move to where the arm stood when the cell was connected.
+    /// Move to where the arm was when the cell was connected.
     GoHome,
     /// Move to where a capture was taken.
     GoToCapture(CaptureId),
-    /// Let the arm make the move that waits for it.
+    /// Allow the move that is waiting.
     ConfirmMove,
-    /// Leave out the move that waits; a sequence goes on with another pose.
+    /// Skip the move that waits; a sequence continues with another pose.
     SkipMove,
     /// Whether each move to a chosen pose waits to be confirmed.
     SetConfirmMoves(bool),
@@ -51,7 +51,7 @@ pub enum Command {
 /// What has happened to moving the arm.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Event {
-    /// The arm was told to stay where it is.
+    /// The arm was commanded to stay where it is.
     Stopped,
     /// A motion has ended.
     Moved {
@@ -59,7 +59,7 @@ pub enum Event {
         id: MotionId,
         outcome: MotionOutcome,
     },
-    /// A held jog button can do no more, or may not: the arm stands.
+    /// A held jog button has no more effect: the arm is at rest.
     JogEnded {
         /// Why, when it was not released.
         why: Option<Text>,

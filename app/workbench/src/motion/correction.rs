@@ -12,28 +12,28 @@ use crate::text::Text;
 /// another tool.
 const FITS: (f64, f64) = (1e-3, 2e-3);
 
-/// What goes with commands that are corrected for the errors of the arm, where it is the one that stands here and its errors may be
-/// counted on.
+/// What is needed for commands that are corrected for the errors of the arm, if it is the connected arm and its errors are
+/// reliable.
 pub fn corrected(model: &Model) -> Option<(&Solved, &Corrected)> {
     let solved = model.solve.current()?;
     let corrected = solved.corrected.as_ref()?;
     stands_here(&corrected.arm, model.robot.as_ref()?).then_some((solved, corrected))
 }
 
-/// Whether this is the arm that reports that.
+/// Whether this is the arm that reports this state.
 pub fn stands_here(arm: &CorrectedArm, robot: &RobotState) -> bool {
     let place = arm.arm.forward(&robot.joints_rad).map(|tip| tip.distance_to(&robot.base_from_tip));
     place.is_ok_and(|(off_m, off_rad)| off_m <= FITS.0 && off_rad <= FITS.1)
 }
 
-/// What a tool arrives within by the controller as it is and by corrected commands, millimetres, 95 %; `None` where the errors of this arm
-/// are not known.
+/// The error of a tool's position with the controller as it is and with corrected commands, millimetres, 95 %; `None` where the
+/// errors of this arm are not known.
 pub fn expected_mm(model: &Model) -> Option<(f64, f64)> {
     let quality = &corrected(model)?.0.result.quality;
     quality.reach_error_95_mm.zip(quality.reach_error_corrected_95_mm)
 }
 
-/// What goes with corrected commands, where these are expected to bring the tip nearer.
+/// What is needed for corrected commands, if these are expected to bring the tip nearer.
 pub(crate) fn helpful(model: &Model) -> Option<&Corrected> {
     let (solved, corrected) = corrected(model)?;
     solved.result.quality.correcting_helps().then_some(corrected)
@@ -51,17 +51,17 @@ pub fn real_tip_error_95_m(model: &Model) -> Option<f64> {
     corrected.arm.error_95_m(&model.robot.as_ref()?.joints_rad).ok()
 }
 
-/// By which arm a move is corrected, and where it begins.
+/// The arm by which a move is corrected, and where it begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// The arm with its errors.
     pub arm: Arc<CorrectedArm>,
-    /// Joint values near which the arm is to stay, radians.
+    /// Joint values near which the arm should stay, radians.
     pub near_rad: Vec<f64>,
 }
 
 impl Correction {
-    /// What to command so that the tip really gets where `goal` has it; a goal in joint values is what it is.
+    /// What to command so that the tip really gets to `goal`; a goal in joint values is left as it is.
     ///
     /// # Errors
     /// Why there is no such command.

@@ -1,4 +1,4 @@
-//! What the arm is asked to do. There is one place, not a queue: what comes while the arm moves is refused with a
+//! What the arm is requested to do. There is one slot, not a queue: what arrives while the arm moves is refused with a
 //! reason, and a stop leaves nothing that could begin later.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -28,7 +28,7 @@ pub enum MotionTask {
         id: MotionId,
         /// Which way, and how fast.
         request: JogRequest,
-        /// How far: metres for translations and prismatic joints, radians for turns and revolute joints.
+        /// How far: metres for translations and prismatic joints, radians for rotations and revolute joints.
         length: f64,
     },
     /// After the board, until it is cancelled.
@@ -47,7 +47,7 @@ pub enum MotionTask {
         /// What is wanted.
         request: Box<GuideRequest>,
     },
-    /// Nothing that moves: where the board can be looked at from, of which only the arm's kinematics tells.
+    /// Nothing that moves: where the board can be looked at from, which only the arm's kinematics determines.
     Plan {
         /// Its number.
         id: MotionId,
@@ -105,13 +105,13 @@ struct Inner {
     line: JogLine,
     /// A stop came while a button was held.
     jog_stopped: bool,
-    /// A button was held since the window last heard that the arm stands.
+    /// A button was held since the window was last notified that the arm is at rest.
     owes_end: bool,
-    /// What the window has to hear from here.
+    /// What the window has to be notified of from here.
     reported: Vec<Event>,
-    /// What a person keeps the arm out of.
+    /// What the user keeps the arm out of.
     keep_out: Arc<Surroundings>,
-    /// The same while the connection does not know of it.
+    /// The same while the connection has not received it.
     owed_keep_out: Option<Arc<Surroundings>>,
 }
 
@@ -123,8 +123,8 @@ pub struct MotionQueue {
 }
 
 impl MotionQueue {
-    /// Nothing is asked for; `grip` knows whether what the window takes for held is held, and `waker` tells the window
-    /// that something was refused.
+    /// Nothing is requested; `grip` knows whether what the window takes for held is held, and `waker` notifies the
+    /// window that something was refused.
     pub fn new(grip: Arc<Grip>, waker: Waker) -> Self {
         Self { inner: Mutex::default(), grip, waker }
     }
@@ -136,7 +136,7 @@ impl MotionQueue {
     /// Asks for a motion. A refusal is reported as the end of the motion.
     pub fn ask(&self, task: MotionTask, stop: &StopLine) {
         let mut inner = self.inner();
-        // Looked at here and not before: a stop that comes now cancels what is begun here.
+        // Checked here and not before: a stop that comes now cancels what is begun here.
         match inner.obstacle(stop.is_barred()) {
             None => inner.doing = Doing::Asked(task),
             Some(why) => {
@@ -150,7 +150,7 @@ impl MotionQueue {
     pub(crate) fn hold(&self, request: JogRequest, stop: &StopLine, now_s: f64) -> bool {
         let mut inner = self.inner();
         inner.owes_end = true;
-        // The window does not know yet that it was let go.
+        // The window does not know yet that it was released.
         if !self.grip.is_firm(Instant::now()) {
             return false;
         }
@@ -171,13 +171,13 @@ impl MotionQueue {
     pub(crate) fn release(&self) {
         let mut inner = self.inner();
         inner.line.release();
-        // Pressed and let go before the worker looked, or held for longer than it meant anything.
+        // Pressed and released before the worker looked, or held for too long to count.
         if inner.owes_end && !matches!(inner.doing, Doing::Jogging) {
             inner.say(Event::JogEnded { why: None }, &self.waker);
         }
     }
 
-    /// What the arm is to keep out of, from its next motion on and over every connection.
+    /// What the arm should keep out of, from its next motion on and over every connection.
     pub(crate) fn keep_out(&self, keep_out: Arc<Surroundings>) {
         let mut inner = self.inner();
         inner.owed_keep_out = Some(Arc::clone(&keep_out));
@@ -189,7 +189,7 @@ impl MotionQueue {
         self.inner().owed_keep_out.take()
     }
 
-    /// Ends what moves, and forgets what was to move next.
+    /// Cancels the motion and clears the next one.
     pub(crate) fn cancel(&self, now_s: f64) {
         let mut inner = self.inner();
         let is_held = inner.bar_held(now_s);
@@ -212,7 +212,7 @@ impl MotionQueue {
         !matches!(inner.doing, Doing::Nothing) || inner.connected && inner.line.request(now_s).is_some()
     }
 
-    /// Hands over what the window has not heard.
+    /// Hands over what the window has not received.
     pub(crate) fn take_messages(&self) -> Vec<Event> {
         std::mem::take(&mut self.inner().reported)
     }
@@ -239,7 +239,7 @@ impl MotionQueue {
         }
     }
 
-    /// Takes what is asked for; the worker does it and then says that it is [`Self::done`].
+    /// Takes the request; the worker carries it out and then calls [`Self::done`].
     pub fn take(&self, now_s: f64) -> Work {
         let mut inner = self.inner();
         match std::mem::take(&mut inner.doing) {
@@ -273,8 +273,8 @@ impl MotionQueue {
         if self.grip.is_silent(now) { Held::Forgotten { after_s: SILENCE.as_secs_f64() } } else { Held::Released }
     }
 
-    /// A jog is over: `why` says what ended it, if that was not its button, and `forgotten` after how long \[s\] in which
-    /// nothing was heard of the button. `None` when another button is held already, which goes on without a word.
+    /// A jog is over: `why` is what ended it, if that was not its button, and `forgotten` after how long \[s\] without a
+    /// report from the button. `None` when another button is held already, which continues without a report.
     pub(crate) fn end_jog(
         &self,
         request: &JogRequest,
@@ -297,7 +297,7 @@ impl MotionQueue {
 }
 
 impl Inner {
-    /// Has the button that is held do nothing more; `false` when none is.
+    /// Makes the held button do nothing more; `false` when none is held.
     fn bar_held(&mut self, now_s: f64) -> bool {
         let is_held = self.line.request(now_s).is_some();
         if is_held {

@@ -14,7 +14,7 @@ fn free() -> StopLine {
     StopLine::default()
 }
 
-/// A stop is on its way.
+/// A stop is pending.
 fn pressed() -> StopLine {
     let stop = StopLine::default();
     stop.press();

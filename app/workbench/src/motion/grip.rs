@@ -1,37 +1,36 @@
-//! What a person holds down at a page of a browser, as the thread knows that listens to the page: the dead man of a held
-//! jog, which must not wait for a frame.
+//! What the user holds down at a page of a browser, as known to the thread that listens to the page: the dead man's
+//! switch of a held jog, which must not wait for a frame.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What is held down moves nothing any more when the page was not heard for so long. Pages say it every 50 ms: three are
-/// missed before.
+/// What is held down moves nothing any more when the page was silent for this long. Pages report it every 50 ms, so
+/// three reports can be missed.
 pub const SILENCE: Duration = Duration::from_millis(200);
 
-/// Whether what the window takes for held is held. The window draws what was done some time ago; in between it may have
-/// been let go.
+/// Whether what the window takes for held is held. The window draws past input; in between it may have been released.
 #[derive(Debug, Default)]
 pub struct Grip {
     inner: Mutex<Inner>,
 }
 
-/// How often what is held was let go.
+/// How often what is held was released.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Times {
-    /// In all.
+    /// In total.
     pub let_go: u64,
-    /// Because nothing was heard for too long.
+    /// Because of too long a silence.
     pub silent: u64,
 }
 
 #[derive(Debug, Default)]
 struct Inner {
-    /// When the page that drives was last heard; `None` without pages, where the window itself hears the person.
+    /// When the driving page last reported; `None` without pages, where the window itself receives the input.
     heard: Option<Instant>,
     times: Times,
-    /// How often something had been let go when the window last looked.
+    /// How often something had been released when the window last looked.
     known: u64,
-    /// Nothing was heard for too long, and that is counted.
+    /// The silence was too long, and that is counted.
     is_silent: bool,
 }
 
@@ -40,7 +39,7 @@ impl Grip {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The page that drives was heard.
+    /// The driving page has reported.
     pub fn hear(&self, now: Instant) {
         let mut inner = self.inner();
         inner.count_silence(now);
@@ -48,26 +47,26 @@ impl Grip {
         inner.is_silent = false;
     }
 
-    /// Something was let go.
+    /// Something was released.
     pub fn let_go(&self) {
         self.inner().times.let_go += 1;
     }
 
-    /// How often something was let go so far.
+    /// How often something was released so far.
     pub fn times(&self, now: Instant) -> Times {
         let mut inner = self.inner();
         inner.count_silence(now);
         inner.times
     }
 
-    /// Whether the page that drives was not heard for too long.
+    /// Whether the driving page was silent for too long.
     pub fn is_silent(&self, now: Instant) -> bool {
         let mut inner = self.inner();
         inner.count_silence(now);
         inner.is_silent
     }
 
-    /// What the window does from now on it does knowing of so many.
+    /// What the window does from now on takes this many releases into account.
     pub fn know(&self, times: Times) {
         let mut inner = self.inner();
         inner.known = inner.known.max(times.let_go);
@@ -82,7 +81,7 @@ impl Grip {
 }
 
 impl Inner {
-    /// Who was silent for too long has let go, also when he is heard again before anybody looked.
+    /// Too long a silence counts as a release, even if the page reports again before anybody looks.
     fn count_silence(&mut self, now: Instant) {
         if !self.is_silent && self.heard.is_some_and(|heard| now.saturating_duration_since(heard) > SILENCE) {
             self.is_silent = true;

@@ -1,27 +1,27 @@
-//! The way of a held jog button to the arm: a dead man's switch. No thread, no clock: the caller says what time it is.
+//! The path of a held jog button to the arm: a dead man's switch. No thread, no clock: the caller passes the time.
 
 use crate::model::Jog;
 use handeye_link::JogRequest;
 
-/// A button counts as held for so long \[s\] after the window last said so: a few frames of a busy window, and short
-/// enough for an arm that nobody holds.
+/// A button counts as held for this long \[s\] after the window last reported it: a few frames of a busy window, and
+/// short enough for an arm that nobody holds.
 pub const HELD_S: f64 = 0.3;
 
-/// What the button says.
+/// State of the button.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Held {
     /// It is held; this is the share of the fastest speed.
     Yes(f64),
-    /// It was let go, or another one is held instead.
+    /// It was released, or another one is held instead.
     Released,
-    /// Nobody has said that it is held.
+    /// No report that it is held.
     Forgotten {
-        /// For so long \[s\].
+        /// For this long \[s\].
         after_s: f64,
     },
 }
 
-/// The button that is held, and one that may do nothing more until it is let go.
+/// The button that is held, and one that may do nothing more until it is released.
 #[derive(Debug, Default)]
 pub struct JogLine {
     held: Option<Hold>,
@@ -42,7 +42,7 @@ struct Bar {
 }
 
 impl JogLine {
-    /// The button is held now. `false` when that means nothing, because the same press has ended before.
+    /// The button is held now. `false` when that has no effect, because the same press has ended before.
     pub fn hold(&mut self, request: JogRequest, now_s: f64) -> bool {
         let until_s = now_s + HELD_S;
         match &mut self.barred {
@@ -56,12 +56,12 @@ impl JogLine {
         true
     }
 
-    /// Every button is let go.
+    /// Every button is released.
     pub fn release(&mut self) {
         (self.held, self.barred) = (None, None);
     }
 
-    /// Ends what the held button does; it has to be let go before it does something again.
+    /// Ends what the held button does; it has to be released before it has an effect again.
     pub fn bar(&mut self, now_s: f64) {
         self.held = None;
         self.barred = Some(Bar { jog: None, until_s: now_s + HELD_S });

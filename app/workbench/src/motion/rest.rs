@@ -1,4 +1,4 @@
-//! What the states say of an arm that was stopped.
+//! What the states report about an arm that was stopped.
 
 use handeye_driver::{Place, RestWatch};
 use handeye_link::moved_text;
@@ -9,17 +9,17 @@ use crate::text::Text;
 use crate::worker::Workers;
 use handeye_wording::text;
 
-/// So long \[s\] an arm has to come to rest: as a driver has for its own answer.
+/// Time \[s\] that an arm has to come to rest: the same as a driver has for its own answer.
 const PATIENCE_S: f64 = 2.0;
 
-/// An arm that was told to stop, until its states say that it stands.
+/// An arm that was commanded to stop, until its states show that it is at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stopping {
     since_s: f64,
     watch: RestWatch,
 }
 
-/// The arm was told to stop. Whether it did is for its states to say.
+/// The arm was commanded to stop. Its states show whether it did.
 fn watch_stop(model: &mut Model) {
     model.stop_pending = true;
     model.stopping = Some(Stopping { since_s: model.now_s, watch: RestWatch::default() });
@@ -28,11 +28,11 @@ fn watch_stop(model: &mut Model) {
     }
 }
 
-/// A state has come.
+/// A state has arrived.
 pub(crate) fn stop_seen(model: &mut Model, robot: &RobotState) {
     let Some(stopping) = &mut model.stopping else { return };
     let is_news = stopping.watch.newest().is_none_or(|newest| newest.stamp_s != robot.sim_time_s);
-    // In a simulation without time nothing moves.
+    // In a simulation whose time is paused nothing moves.
     if robot.simulation != Simulation::Running || is_news && stopping.watch.take(place(robot)) {
         stop_is_over(model, Severity::Info, text!("Arm stopped: every joint stays where it is"));
     }
@@ -53,7 +53,7 @@ pub(crate) fn stop_waits(model: &mut Model) {
                 moved = moved_text(&moved, |joint| Some(model.joint_kind(joint)))
             ),
         ),
-        // A simulation that somebody holds.
+        // A simulation that the user has paused.
         _ if model.moves() == Moves::Freely && model.robot.is_some() => {
             (Severity::Info, text!("Arm stopped: every joint stays where it is"))
         }

@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 use crate::motion::correction::Correction;
 use crate::text::Text;
 
-/// Counts motions, so that what is reported can be told from what came before.
+/// Counts motions, to distinguish reports from those of earlier motions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct MotionId(pub u64);
 
-/// A motion that is asked for.
+/// A requested motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionRequest {
     /// Its number.
@@ -27,13 +27,13 @@ impl MotionRequest {
     /// Where the arm is sent.
     ///
     /// # Errors
-    /// Why no command takes the tip there.
+    /// Why no command gets the tip there.
     pub(crate) fn goal(&self) -> Result<MotionGoal, Text> {
         self.correction.as_ref().map_or_else(|| Ok(self.goal), |correction| correction.command(&self.goal))
     }
 }
 
-/// A move that waits until a person lets the arm go.
+/// A move that waits until the user allows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PendingMove {
     /// Where to.
@@ -60,7 +60,7 @@ pub enum Motion {
     Jogging(Jog),
 }
 
-/// How far one press of a jog button goes.
+/// How far one press of a jog button moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub enum JogStep {
     /// As long as it is held.
@@ -79,11 +79,12 @@ pub enum JogStep {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct JogSettings {
-    /// Whose axes.
+    /// The axes' frame.
     pub frame: JogFrame,
     /// How far.
     pub step: JogStep,
-    /// Share of the fastest speed, over 0 and up to 1; `None` as [`Model::speed`](crate::model::Model::speed) has it.
+    /// Share of the fastest speed, over 0 and up to 1; `None`: as given by
+    /// [`Model::speed`](crate::model::Model::speed).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed: Option<f64>,
 }

@@ -50,7 +50,7 @@ pub(crate) fn start_motion(cx: &mut Context, goal: MotionGoal, what: Text) {
     start(cx, goal, what, None);
 }
 
-/// The same by the errors of the arm. Where they are not known any more nothing moves: the person asked for another place.
+/// The same with the errors of the arm. If these are no longer known nothing moves: the user asked for another place.
 fn start_corrected(cx: &mut Context, goal: MotionGoal, what: Text) {
     let arm = corrected(&cx.model).map(|(_, corrected)| Arc::clone(&corrected.arm));
     let Some((arm, robot)) = arm.zip(cx.model.robot.as_ref()) else {
@@ -124,7 +124,7 @@ pub(crate) fn moved(cx: &mut Context, id: MotionId, outcome: MotionOutcome) {
             cx.model.notify_in(Pane::Jog, Severity::Error, reported);
         }
     }
-    // What an earlier motion still has to say does not move a sequence on.
+    // The late report of an earlier motion does not advance a sequence.
     if cx.model.sequence_runs && id == cx.numbers.motion {
         sequence_moved(cx, &outcome);
     }
@@ -179,7 +179,7 @@ pub(crate) fn motion_lost(cx: &mut Context) {
     cx.model.motion = Motion::Idle;
 }
 
-/// The camera on the tip as calibrated, or else as the scene says: only to choose the axes that a person jogs along.
+/// The camera on the tip as calibrated, or else as given by the scene: only to choose the axes of jogging.
 fn camera_on_tip(model: &Model) -> Option<Pose<Tip, Camera>> {
     let reported = || Some(model.cell.as_ref()?.truth.as_ref()?.tip_from_camera);
     model.tip_from_camera().or_else(reported)

@@ -7,23 +7,23 @@ use crate::model::{Model, MotionGoal};
 use crate::text::Text;
 use handeye_wording::text;
 
-/// Way of a joint [rad, m of a prismatic one] by which an arm that stands may differ from itself: less than the free space
-/// about a planned way at a reach of 2 m.
+/// Travel of a joint [rad, m of a prismatic one] within which an arm counts as at the same place: less than the free space
+/// about a planned path at a reach of 2 m.
 pub(crate) const STANDS: f64 = 5e-3;
-/// And of the tip \[m\], as a settled arm is told by elsewhere; its turn \[rad\] is that of a joint.
+/// The same for the tip \[m\], as for a settled arm elsewhere; for its rotation \[rad\] the joint value is used.
 const STANDS_M: f64 = 5e-4;
 
-/// From where the arm stands to a goal.
+/// From where the arm is to a goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Way {
-    /// How far the tip goes \[m\] and turns \[rad\]; `None` where nobody can tell.
+    /// How far the tip moves \[m\] and turns \[rad\]; `None` if unknown.
     pub tip: Option<(f64, f64)>,
-    /// The joint that goes farthest, counted from 0, and how far [rad, or m of a prismatic one].
+    /// The joint that moves farthest, counted from 0, and how far [rad, or m of a prismatic one].
     pub joint: Option<(usize, f64)>,
 }
 
 impl Way {
-    /// `None` while nobody knows where the arm stands.
+    /// `None` while the arm's position is not known.
     pub fn to(goal: &MotionGoal, model: &Model) -> Option<Self> {
         let robot = model.robot.as_ref()?;
         let here = &robot.joints_rad;
@@ -50,7 +50,7 @@ impl Way {
         }
     }
 
-    /// For people.
+    /// For display.
     pub fn text(&self, model: &Model) -> Text {
         let mm = |metres: f64| format!("{:.0}", metres * 1e3);
         let deg = |radians: f64| format!("{:.1}", radians.to_degrees());
@@ -74,7 +74,7 @@ impl Way {
     }
 }
 
-/// Whether the arm was moved between two moments; one that says nothing was.
+/// Whether the arm was moved between two moments; if either is unknown, it was.
 pub fn has_moved(from: Option<&JointValues>, to: Option<&JointValues>) -> bool {
     match (from, to) {
         (Some(from), Some(to)) => from.len() != to.len() || travel(from, to) > STANDS,

@@ -1,4 +1,4 @@
-//! The motion worker: moves the arm, one thing at a time, and says how it ended.
+//! The motion worker: moves the arm, one motion at a time, and reports how it ended.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -20,21 +20,21 @@ use crate::{guided, keep_out, motion, taught, track};
 use handeye_link::{Cell, Connected, JogRequest, MotionPort, PortError, ViewsRequest, end_of_following};
 use handeye_wording::text;
 
-/// Rest between two looks at the connection. Work does not wait for it: the worker is woken.
+/// Pause between two looks at the connection. Work does not wait for it: the worker is woken.
 const PERIOD: Duration = Duration::from_millis(100);
 
 /// Look at the [`MotionQueue`] now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionLook;
 
-/// The duty of the motion worker.
+/// The job of the motion worker.
 pub struct Motions {
     desk: Arc<MotionQueue>,
     line: Arc<FollowLine>,
 }
 
 impl Motions {
-    /// With the places where it is told what to do, and where the board is.
+    /// With the slots where it receives its requests, and where the board is.
     pub fn new(desk: Arc<MotionQueue>, line: Arc<FollowLine>) -> Self {
         Self { desk, line }
     }
@@ -60,7 +60,7 @@ impl Motions {
         self.desk.done();
         let (reported, ended) = match outcome {
             Ok(outcome) => (outcome, Ok(())),
-            // Nobody sends the arm any further. What may still move is the business of the stop.
+            // Nobody sends the arm any further. What may still move is left to the stop.
             Err(error) if cancel.is_cancelled() => (MotionOutcome::Stopped, Err(error)),
             Err(error) => {
                 (MotionOutcome::Failed(text!("The connection broke: {error}", error = error.why().clone())), Err(error))
@@ -153,7 +153,7 @@ impl Motions {
         ended
     }
 
-    /// Before anything moves, and after what moves was taken: what was wished before it holds for it.
+    /// Before anything moves, and after a motion was taken: a wish made before the motion applies to it.
     fn keep_out(&self, port: &mut dyn MotionPort, outlet: &Outlet) {
         let Some(keep_out) = self.desk.take_keep_out() else { return };
         outlet.report(keep_out::Event::Standing(port.keep_out(&keep_out).map(Arc::new)));
@@ -193,7 +193,7 @@ impl Duty for Motions {
         worked
     }
 
-    /// The turn that follows looks.
+    /// The next turn looks at it.
     fn perform(
         &mut self,
         _port: Option<&mut Self::Port>,
@@ -204,7 +204,7 @@ impl Duty for Motions {
     }
 }
 
-/// A defect in the choice must not take the thread that moves the arm.
+/// A bug in the choice must not end the thread that moves the arm.
 fn chosen(request: &GuideRequest, robot: &Robot, cancel: &CancelToken) -> Result<Box<Choice>, Text> {
     let chosen = catch_unwind(AssertUnwindSafe(|| request.choose(robot, cancel)));
     chosen.map(Box::new).map_err(|_panic| text!("The choice of a pose failed by a defect of this program: report it"))

@@ -1,4 +1,4 @@
-//! What may be wanted of the recording for Rerun, and what is reported.
+//! Commands and events of the recording for Rerun.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::model::RerunState;
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
-    /// Look at the recording in Rerun.
+    /// Open the recording in Rerun.
     OpenRerun,
 }
 

@@ -1,4 +1,4 @@
-//! What is recorded. Plain data that costs the sender no more than a few reference counts.
+//! What is recorded. Plain data that costs the sender only a few reference counts.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::model::{CellFacts, FrameImages, FrameInfo, LiveDetection, Observed, S
 /// Something to record.
 #[derive(Debug, Clone)]
 pub enum Entry {
-    /// A cell was connected; its truth, where it publishes one.
+    /// A cell was connected; its ground truth, if it publishes one.
     Cell(Arc<CellFacts>),
     Robot {
         /// Simulated time \[s\].
@@ -53,9 +53,9 @@ pub enum Entry {
     Planned(Vec<Pose<Base, Tip>>),
     /// What the arm keeps clear of.
     KeepOut {
-        /// What the cell says stands around.
+        /// The obstacles that the cell reports.
         scene_obstacles: Arc<Surroundings>,
-        /// What a person keeps the arm out of.
+        /// What the user keeps the arm out of.
         own: Arc<Surroundings>,
     },
     /// Captures that are selected in the window.

@@ -1,5 +1,5 @@
-//! What a recording is told: everything that happens, as [`Entry`]s. How they are kept and looked at is another crate's
-//! business, which implements [`Recording`].
+//! What a recording receives: everything that happens, as [`Entry`]s. How they are kept and viewed is left to the crate
+//! that implements [`Recording`].
 
 pub mod command;
 mod entry;
@@ -15,18 +15,17 @@ pub use entry::Entry;
 /// Where a browser that shows the window finds the recording: a path of the same server.
 pub const BROWSER_PATH: &str = "/rerun/";
 
-/// A recording of everything that happens. Nothing in it waits for a disk or a viewer, but for [`finish`](Self::finish).
+/// A recording of everything that happens. Nothing in it waits for a disk or a viewer, except [`finish`](Self::finish).
 pub trait Recording {
-    /// Records an entry, later and elsewhere. A document in another folder begins another recording.
+    /// Records an entry, later and elsewhere. A document in another folder starts another recording.
     fn note(&self, entry: Entry);
 
     /// Opens a viewer; how that goes is reported.
     fn open_viewer(&self);
 
-    /// Hands over what is to be told since the last time.
+    /// Hands over the events since the last time.
     fn drain(&self, absorb: &mut dyn FnMut(crate::command::Event));
 
-    /// Has everything written that was noted, waits for that no longer than so long, and ends. Returns whether all of it
-    /// is where it belongs.
+    /// Writes everything that was noted, waits at most this long, and ends. Returns whether all of it was written.
     fn finish(&mut self, deadline: Duration) -> bool;
 }

@@ -14,7 +14,7 @@ pub(crate) struct Recorded {
     pub step: Option<Step>,
     pub selection: Vec<CaptureId>,
     pub planned: Vec<Pose<Base, Tip>>,
-    /// What the cell says stands around, and what a person keeps the arm out of.
+    /// The obstacles that the cell reports, and what the user keeps the arm out of.
     pub around: Option<[Arc<Surroundings>; 2]>,
     /// Messages with smaller numbers.
     pub reported: u64,

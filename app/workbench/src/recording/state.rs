@@ -11,7 +11,7 @@ use crate::text::Text;
 pub struct RerunState {
     /// Whether anything is recorded.
     pub on: bool,
-    /// The file beside the session that is written.
+    /// The file next to the session that is written.
     pub file: Option<PathBuf>,
     /// How it is looked at.
     pub viewer: ViewerState,

@@ -33,7 +33,7 @@ pub(crate) fn absorb(model: &mut Model, desk: &SessionThreads, event: Event) {
     }
 }
 
-/// Shows where the web viewer is, to copy it. A dialog that somebody uses stays: the address is also behind the button.
+/// Shows where the web viewer is, to copy it. A dialog that is in use stays: the address is also behind the button.
 fn show_rerun_address(model: &mut Model, desk: &SessionThreads) {
     if model.dialog.is_none() {
         set_dialog(model, desk, Some(Dialog::RerunAddress));

@@ -1,4 +1,4 @@
-//! The report as Markdown: what a person reads beside the scene.
+//! The report as Markdown: read next to the scene.
 
 use super::{Line, Section, sections};
 use crate::model::Solved;

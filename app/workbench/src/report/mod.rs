@@ -1,4 +1,4 @@
-//! What there is to say of a calibration, once, for a page of text and for Markdown.
+//! What there is to report about a calibration, in one place, for a page of text and for Markdown.
 
 mod markdown;
 mod page;
@@ -20,14 +20,14 @@ pub use page::{of_session, page, shared_camera};
 use crate::model::Solved;
 use handeye_wording::{English, decimals, shown};
 
-/// What is said of one thing. Numbers have their units.
+/// What is reported about one thing. Numbers have their units.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Section {
-    /// What it is; nothing for the findings, which speak for themselves.
+    /// What it is; empty for the findings, which need no title.
     pub title: String,
-    /// In short, what is said of it.
+    /// The short form.
     pub summary: Vec<String>,
-    /// And at length.
+    /// The long form.
     pub lines: Vec<Line>,
     /// Letters that the names of rows take on a page.
     pub name_width: usize,
@@ -85,7 +85,7 @@ fn headline(result: &CalibrationResult) -> Section {
     }
 }
 
-/// What a user of the calibration can expect; `None` for a camera alone.
+/// What a user of the calibration can expect; `None` for a camera without a robot.
 fn expected_error(result: &CalibrationResult) -> Option<String> {
     let Some(error) = result.quality.tip_error_95_mm else {
         let why = match (result.problem(), &result.estimate) {
@@ -106,7 +106,7 @@ fn expected_error(result: &CalibrationResult) -> Option<String> {
     })
 }
 
-/// How near a tool arrives, and why that is not known.
+/// How near a tool gets, or why that is not known.
 fn reach(result: &CalibrationResult) -> Option<String> {
     let Some(plain) = result.quality.reach_error_95_mm else {
         let is_unknown = result.arm.as_ref().is_none_or(|arm| arm.contradicted);
@@ -130,14 +130,16 @@ fn reach(result: &CalibrationResult) -> Option<String> {
     })
 }
 
-/// What was found moves the answer by and what remains of an error, in millimetres: they add up as they are printed.
+/// By how much what was found moves the answer, and what remains of an error, in millimetres: they add up as they are
+/// printed.
 pub fn in_parts(error_mm: f64, moved_mm: f64) -> (String, String) {
     let micrometres = |mm: f64| (mm * 1e3).round();
     let rest = micrometres(error_mm) - micrometres(moved_mm);
     (format!("{moved_mm:.3}"), format!("{:.3}", rest / 1e3))
 }
 
-/// What the standard deviations are: with something found that is not in the model they are no error of the answer.
+/// What the standard deviations are: if something was found that is not in the model they are not the error of the
+/// answer.
 fn sigma_name(result: &CalibrationResult) -> &'static str {
     let moved = result.estimate.as_ref().is_some_and(|estimate| estimate.moved_mm.is_some());
     if moved || result.problem().is_some() { "standard deviation by noise alone" } else { "standard deviation" }
@@ -237,7 +239,7 @@ fn with_sigma(what: &str, values: &[f64], sigmas: &[f64], unit: &str) -> String 
     format!("{what} {}{unit}", each.join(", "))
 }
 
-/// What the joint estimate says of itself: only what there is to say.
+/// Details of the joint estimate: only what is worth reporting.
 fn details(estimate: &EstimateDetails) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(sigma) = estimate.view_sigma_px.filter(|sigma| *sigma > 0.0) {
@@ -259,7 +261,7 @@ fn details(estimate: &EstimateDetails) -> Vec<String> {
             out.push(format!("target {:.5} ± {sigma:.5} times its stated size", board.scale));
         }
     }
-    // One size: that which is estimated, or else what the robot's motion says of the one that is taken as stated.
+    // One size: the estimated one, or else what the robot's motion implies for the one that is taken as stated.
     let estimated = estimate.board.as_ref().is_some_and(|board| board.scale_sigma.is_some());
     if let Some(size) = estimate.target_size.filter(|_| !estimated) {
         let (scale, sigma) = (size.true_over_stated, size.sigma);
@@ -338,7 +340,7 @@ fn views(result: &CalibrationResult) -> Section {
     Section { title: "views".to_owned(), lines: lines.collect(), name_width: 24, ..Section::default() }
 }
 
-/// What the depths of the captures are off.
+/// Errors of the depths of the captures.
 fn depth_camera(result: &CalibrationResult) -> Option<Section> {
     let depth = result.depth?;
     let title = match depth.captures {
@@ -370,7 +372,7 @@ fn depth_camera(result: &CalibrationResult) -> Option<Section> {
     Some(Section { title, summary: vec![filled], lines, name_width: 8 })
 }
 
-/// How the answer does on captures that never entered the fit; nothing when there are none.
+/// How the answer does on captures that never entered the fit; empty when there are none.
 fn verification(solved: &Solved) -> Vec<Section> {
     let title = "verification";
     match &solved.verification {

@@ -10,7 +10,7 @@ pub fn page(solved: &Solved) -> String {
     text(&sections(solved))
 }
 
-/// One session of several: what it is worth and what was found, under its `name`. It ends with a newline.
+/// One session of several: how good it is and what was found, under its `name`. It ends with a newline.
 pub fn of_session(name: &str, result: &CalibrationResult) -> String {
     format!("{name}\n{}", text(&[headline(result), findings(result)]))
 }

@@ -1,4 +1,4 @@
-//! The arm: where it stands, and what its joints do to its links.
+//! The arm: where it is, and how its joints move its links.
 
 use std::sync::LazyLock;
 
@@ -22,19 +22,19 @@ static BUILT_IN: LazyLock<Option<ArmKinematics>> = LazyLock::new(|| {
 /// An arm with its joints at some positions.
 #[derive(Debug, Clone)]
 pub struct PosedArm {
-    /// Where it stands.
+    /// Where its base is.
     pub base_from_arm: Isometry3<f64>,
     /// What each link, counted from the foot, has moved since all joints were zero.
     pub links: Vec<Isometry3<f64>>,
-    /// Its bodies in the arm frame with all joints at zero, each with the number of its link: those of the UR5, and of any
-    /// other arm tubes between its joints.
+    /// Its bodies in the arm frame with all joints at zero, each with the number of its link: those of the UR5, and tubes
+    /// between its joints for any other arm.
     pub bodies: Vec<(usize, Solid)>,
 }
 
-/// The arm with these joints; `None` for one whose kinematics is not known, and for joints that are not its own.
+/// The arm with these joints; `None` for one whose kinematics is not known, and for joints of another arm.
 ///
-/// It stands where it was measured in the cell. Without a cell it is that of the built-in scene, if its tip is where the
-/// robot reported it: an arm that ends beside its tip would be a lie.
+/// Its place is as measured in the cell. Without a cell it is the arm of the built-in scene, if its tip is where the
+/// robot reported it: an arm that does not end at its tip would be wrong.
 pub fn posed_arm(cell: Option<&CellFacts>, base_from_tip: &Pose<Base, Tip>, joints: &[f64]) -> Option<PosedArm> {
     let kinematics = match cell {
         Some(facts) => facts.arm.as_ref(),

@@ -1,4 +1,4 @@
-//! The captures: where each was taken, what it is for, and what the calibration makes of it.
+//! The captures: where each was taken, what it is for, and its result in the calibration.
 
 use handeye_estimate::{CornerResidual, ViewStatus};
 use handeye_geometry::frames::{Base, Camera, Pose, Target};
@@ -8,8 +8,8 @@ use handeye_session::{CaptureId, CaptureRecord, Role};
 use super::Known;
 use crate::model::Solved;
 
-/// A capture whose residual is this many times that of the median one is as bad as its colour can say. It is also where a
-/// view starts to be named in the findings.
+/// A capture whose residual is this many times that of the median one has the worst colour. It is also where a view
+/// starts to be named in the findings.
 pub const BAD_AT_MEDIANS: f64 = 3.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,36 +18,36 @@ pub enum CaptureUse {
     Fit,
     /// It verifies it.
     Verification,
-    /// A person took it out.
+    /// The user excluded it.
     Excluded,
-    /// It is meant to be in the fit, and the answer is without it.
+    /// It is meant to be in the fit, but the answer does not use it.
     Rejected,
 }
 
 /// A capture as it is drawn.
 #[derive(Debug, Clone, Copy)]
 pub struct CaptureItem {
-    /// Where its camera was; `None` while nothing says where the camera sits.
+    /// Where its camera was; `None` while the camera's mounting is not known.
     pub base_from_camera: Option<Pose<Base, Camera>>,
     pub used_as: CaptureUse,
     /// RMS of its residuals \[px\].
     pub rms_px: Option<f64>,
-    /// The same, as a multiple of the median of those that are for the same.
+    /// The same, as a multiple of the median of the captures with the same purpose.
     pub times_median: Option<f64>,
 }
 
-/// What a calibration says of a capture: of its fit, or of its verification.
+/// The result of a calibration for a capture: of its fit, or of its verification.
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome<'a> {
     pub residuals: &'a [CornerResidual],
-    /// Where its board is by the calibration.
+    /// Where its board is according to the calibration.
     pub camera_from_target: Option<Pose<Camera, Target>>,
     rms_px: Option<f64>,
     is_outlier: bool,
     verifies: bool,
 }
 
-/// What a calibration says of a capture; `None` of one that it did not see.
+/// The result of a calibration for a capture; `None` for one that it did not use.
 pub fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
     if let Some(index) = solved.captures.iter().position(|capture| *capture == id) {
         let view = solved.calibration.views.get(index)?;
@@ -71,7 +71,7 @@ pub fn outcome(solved: &Solved, id: CaptureId) -> Option<Outcome<'_>> {
     })
 }
 
-/// The captures beside each other.
+/// All captures, to compare them.
 #[derive(Debug, Clone, Copy)]
 pub struct Captures<'a> {
     known: &'a Known,

@@ -1,4 +1,4 @@
-//! What may be wanted of the 3D pane.
+//! Commands of the 3D pane.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +9,6 @@ use crate::model::SceneView;
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
-    /// From where the 3D pane looks.
+    /// The viewpoint of the 3D pane.
     SetView(SceneView),
 }

@@ -1,4 +1,4 @@
-//! How much room arm, cameras, boards and captures take, for whoever looks at all of them.
+//! How much room arm, cameras, boards and captures take, for viewers that show all of them.
 
 use handeye_cell::render::Shape;
 use handeye_geometry::frames::{Base, Pose, Tip};
@@ -19,10 +19,10 @@ const FRUSTUM_M: f64 = 0.2;
 /// A ball about a single point has this radius \[m\].
 const LEAST_M: f64 = 0.15;
 
-/// A ball in the base that has all of it.
+/// A ball in the base frame that contains all of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// Its middle.
+    /// Its centre.
     pub centre: Point3<f64>,
     /// Its radius \[m\].
     pub radius_m: f64,

@@ -10,11 +10,11 @@ use handeye_geometry::targets::TargetSpec;
 use super::{BoardItem, CameraItem, Fixed, Item, PlannedItem, Role};
 use crate::model::{CellFacts, Model, Solved};
 
-/// What of a simulated cell is true.
+/// The ground truth of a simulated cell.
 #[derive(Debug, Clone)]
 pub struct Truth {
     camera: Fixed<Camera>,
-    /// `None` where the cell does not say.
+    /// `None` where the cell does not report it.
     board: Option<Fixed<Target>>,
     intrinsics: Option<Intrinsics>,
 }
@@ -32,13 +32,13 @@ fn places(links: &HandEye) -> (Fixed<Camera>, Fixed<Target>) {
 }
 
 impl Truth {
-    /// Of both links.
+    /// From both links.
     pub fn of_links(links: &HandEye, intrinsics: Option<Intrinsics>) -> Self {
         let (camera, board) = places(links);
         Self { camera, board: Some(board), intrinsics }
     }
 
-    /// As a cell publishes it.
+    /// As published by a cell.
     fn of_cell(facts: &CellFacts) -> Option<Self> {
         let truth = facts.truth.as_ref()?;
         Some(Self {
@@ -52,9 +52,9 @@ impl Truth {
 /// Everything that was reported so far.
 #[derive(Debug, Default)]
 pub struct Known {
-    /// Where the camera sits by the document; eye in hand before there is one.
+    /// Where the camera is mounted according to the document; eye in hand before there is one.
     pub document_mode: Option<Mode>,
-    /// What is looked at.
+    /// The target.
     pub target: Option<TargetSpec>,
     pub cell: Option<CellFacts>,
     /// The truth that the document keeps.
@@ -63,9 +63,9 @@ pub struct Known {
     pub solved: Option<Arc<Solved>>,
     /// The newest tip.
     pub base_from_tip: Option<Pose<Base, Tip>>,
-    /// Where the newest image has the board by what a simulated cell says, which may move it.
+    /// Where the board is in the newest image according to a simulated cell, which may move it.
     pub base_from_target_true: Option<Pose<Base, Target>>,
-    /// Where the board is tracked.
+    /// Where the board is according to tracking.
     pub base_from_target_tracked: Option<Pose<Base, Target>>,
 }
 
@@ -91,7 +91,7 @@ impl Known {
         self.solved.as_ref()?.calibration.hand_eye.as_ref()
     }
 
-    /// Where the camera sits.
+    /// Where the camera is mounted.
     pub fn mode(&self) -> Mode {
         self.hand_eye().map(HandEye::mode).or(self.document_mode).unwrap_or(Mode::EyeInHand)
     }
@@ -101,7 +101,7 @@ impl Known {
         self.cell.as_ref().and_then(Truth::of_cell).or_else(|| self.document_truth.clone())
     }
 
-    /// The camera: as calibrated, or else as the cell's settings say.
+    /// The camera: as calibrated, or else from the cell's settings.
     pub fn intrinsics(&self) -> Option<Intrinsics> {
         let calibrated = self.solved.as_ref().and_then(|solved| solved.calibration.intrinsics());
         calibrated
@@ -109,8 +109,8 @@ impl Known {
             .or_else(|| self.document_truth.as_ref()?.intrinsics)
     }
 
-    /// The camera on its mount: as calibrated, or else as the cell says of itself, so that there is something to see
-    /// before the first calibration. `None` for a robot that says nothing.
+    /// The camera on its mount: as calibrated, or else as the cell reports it, so that there is something to see before
+    /// the first calibration. `None` for a robot that does not report it.
     pub fn mount(&self) -> Option<(Role, Fixed<Camera>)> {
         if let Some(hand_eye) = self.hand_eye() {
             return Some((Role::Predictor, places(hand_eye).0));
@@ -125,7 +125,7 @@ impl Known {
         self.mount()?.1.in_base(Some(base_from_tip))
     }
 
-    /// Where the calibration has the board in an image from this pose: the bare chain.
+    /// Where the calibration predicts the board in an image from this pose: the bare chain.
     pub fn predicted_camera_from_target(&self, base_from_tip: &Pose<Base, Tip>) -> Option<Pose<Camera, Target>> {
         let (camera, board) = places(self.hand_eye()?);
         Some(camera.in_base(Some(base_from_tip))?.inverse() * board.in_base(Some(base_from_tip))?)
@@ -137,7 +137,7 @@ impl Known {
         Some(Item { role, place, shape: Some(self.intrinsics()?) })
     }
 
-    /// What will be seen at a pose that the arm goes to; `None` where it is not known where on the tip it sits.
+    /// What will be seen at a pose that the arm moves to; `None` where the mounting on the tip is not known.
     pub fn planned(&self, base_from_tip: &Pose<Base, Tip>) -> Option<PlannedItem> {
         if let Some(BoardItem { place: Fixed::Tip(tip_from_target), shape: Some(target), .. }) = self.board() {
             return Some(PlannedItem::Board(*base_from_tip * tip_from_target, target));
@@ -158,7 +158,7 @@ impl Known {
         [self.tracked_board(), self.board(), self.true_board()].into_iter().flatten()
     }
 
-    /// The board by the calibration: where it stood, or on the tip.
+    /// The board according to the calibration: where it was, or on the tip.
     pub fn board(&self) -> Option<BoardItem> {
         Some(self.board_at(Role::Predictor, places(self.hand_eye()?).1))
     }

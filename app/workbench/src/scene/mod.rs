@@ -1,7 +1,7 @@
-//! What stands where in the cell: one list of items, from which the 3D pane is painted and the recording is written.
+//! Where everything is in the cell: one list of items, from which the 3D pane is painted and the recording is written.
 //!
-//! [`Known`] is what has been said so far of cell, camera, board and truth; the items follow from it. An item is plain
-//! data: what it is, where it is, and its shape. How that looks, and when it is drawn, is a matter of who draws it.
+//! [`Known`] is what has been reported so far about cell, camera, board and truth; the items follow from it. An item is
+//! plain data: what it is, where it is, and its shape. How that looks, and when it is drawn, is up to the renderer.
 
 mod arm;
 mod captures;
@@ -23,7 +23,7 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::model::{Model, SceneView};
 
-/// Where something is fixed.
+/// What something is fixed to.
 #[derive(Debug, Clone, Copy)]
 pub enum Fixed<F: Frame> {
     Base(Pose<Base, F>),
@@ -31,7 +31,7 @@ pub enum Fixed<F: Frame> {
 }
 
 impl<F: Frame> Fixed<F> {
-    /// Where it is with the tip there; `None` for something on a tip of which that is not known.
+    /// Where it is with the tip there; `None` for something on the tip if the tip is not known.
     pub fn in_base(&self, base_from_tip: Option<&Pose<Base, Tip>>) -> Option<Pose<Base, F>> {
         match self {
             Self::Base(base_from_it) => Some(*base_from_it),
@@ -48,20 +48,20 @@ impl<F: Frame> Fixed<F> {
     }
 }
 
-/// How it is known where something is.
+/// How the place of something is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// By the calibration.
+    /// From the calibration.
     Predictor,
-    /// By what the cell says of itself, before there is a calibration.
+    /// As the cell reports it, before there is a calibration.
     Reported,
-    /// By tracking.
+    /// From tracking.
     Tracked,
-    /// By what a simulated cell says, to compare with.
+    /// As a simulated cell reports it, for comparison.
     True,
 }
 
-/// Something that stands in the cell.
+/// Something in the cell.
 #[derive(Debug, Clone, Copy)]
 pub struct Item<F: Frame, Shape> {
     /// How its place is known.
@@ -75,7 +75,7 @@ pub struct Item<F: Frame, Shape> {
 pub type CameraItem = Item<Camera, Intrinsics>;
 pub type BoardItem = Item<Target, TargetSpec>;
 
-/// What will stand at a pose that the arm goes to.
+/// What will be at a pose that the arm moves to.
 #[derive(Debug, Clone, Copy)]
 pub enum PlannedItem {
     /// The camera on the tip.
@@ -84,7 +84,7 @@ pub enum PlannedItem {
     Board(Pose<Base, Target>, TargetSpec),
 }
 
-/// The view of all that the window shows of the cell; `None` where there is nothing.
+/// The view of everything that the window shows of the cell; `None` if there is nothing.
 pub fn fitted_view(model: &Model) -> Option<SceneView> {
     let robot = model.robot.as_ref().filter(|robot| robot.base_from_tip.is_finite());
     let arm = robot.and_then(|robot| posed_arm(model.cell.as_ref(), &robot.base_from_tip, &robot.joints_rad));
@@ -93,8 +93,8 @@ pub fn fitted_view(model: &Model) -> Option<SceneView> {
     Some(SceneView { centre_m: extent.centre.into(), distance_m: extent.distance_m(), ..SceneView::default() })
 }
 
-/// The corners of the end of the pyramid that a camera sees, so far away \[m\], in its frame: top left, top right, bottom
-/// right, bottom left. The bend of the lens is not in it.
+/// The corners of the end of the pyramid that a camera sees, at this distance \[m\], in its frame: top left, top right,
+/// bottom right, bottom left. Lens distortion is not included.
 pub fn frustum_end(intrinsics: &Intrinsics, length_m: f64) -> [Point3<f64>; 4] {
     let Intrinsics { width, height, fx, fy, cx, cy, .. } = *intrinsics;
     let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
@@ -103,7 +103,7 @@ pub fn frustum_end(intrinsics: &Intrinsics, length_m: f64) -> [Point3<f64>; 4] {
 }
 
 /// The corners of the outer edge of a board, with the row of squares around the inner corners of a chessboard, wider by a
-/// part of a square: the first beside the origin, then along x.
+/// part of a square: the first next to the origin, then along x.
 pub fn outline(target: &TargetSpec, margin: f64) -> [Point3<f64>; 4] {
     let before = (1.0 + margin) * target.grid().square_m;
     let far = target.extent().add_scalar(before);

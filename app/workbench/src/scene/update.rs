@@ -1,4 +1,4 @@
-//! From where the 3D pane looks.
+//! The viewpoint of the 3D pane.
 
 use super::command::Command;
 use crate::model::Model;
@@ -10,7 +10,7 @@ pub(crate) fn apply(model: &mut Model, command: Command) {
     }
 }
 
-/// Looks at all that there is, once it is known what that is.
+/// Fits the view to everything that is known, once it is known.
 pub(crate) fn fit_scene(model: &mut Model) {
     let is_there = model.robot.is_some() && model.cell.is_some();
     let is_recorded = !model.control.is_connected() && !model.document().captures.is_empty();

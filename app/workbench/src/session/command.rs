@@ -1,4 +1,4 @@
-//! What may be wanted of the session, and what is reported.
+//! Commands and events of the session.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,27 +17,27 @@ use crate::text::Text;
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
-    /// Begin a session, in a folder or under the folder of sessions.
+    /// Start a session, in a folder or under the folder of sessions.
     New(Option<PathBuf>),
-    /// Go on with a session, or copy a data set into one.
+    /// Continue a session, or copy a data set into one.
     Open(PathBuf),
     /// Copy the recorded sample that comes with the program into a session.
     OpenSample,
-    /// Go on with a complete copy in another folder.
+    /// Continue with a complete copy in another folder.
     SaveAs(PathBuf),
     /// Read the folders in a folder.
     ListFolder(PathBuf),
     /// Show a folder in the file manager of the system.
     OpenFolder(PathBuf),
-    /// Take the last change of the session back.
+    /// Undo the last change of the session.
     Undo,
-    /// Make the change again that was taken back.
+    /// Redo the undone change.
     Redo,
     /// Which captures are selected; the last one's image is shown.
     Select(Vec<CaptureId>),
     /// Show the live image again.
     BackToLive,
-    /// Take captures out of the fit, or back in.
+    /// Exclude captures from the fit, or include them again.
     SetExcluded {
         ids: Vec<CaptureId>,
         /// Out.
@@ -51,11 +51,11 @@ pub enum Command {
     },
     /// Delete captures; undo brings them back.
     Delete(Vec<CaptureId>),
-    /// The camera sits elsewhere.
+    /// The camera is mounted elsewhere.
     SetMode(Mode),
     /// What is known of the camera.
     SetCamera(Option<CameraInput>),
-    /// The robot is known to be so accurate, millimetres RMS; `None` where that is not known.
+    /// The robot is known to have this accuracy, millimetres RMS; `None` where that is not known.
     SetRobotAccuracy(Option<f64>),
 }
 
@@ -66,12 +66,12 @@ pub enum Event {
     Document(Box<SessionState>),
     /// Another session is open.
     Opened {
-        /// Whether its folder has files of exports that are younger than its last change.
+        /// Whether its folder has files of exports that are newer than its last change.
         exported: bool,
     },
-    /// A session could not be begun, opened or copied.
+    /// A session could not be started, opened or copied.
     Failed { why: Text },
-    /// A capture was looked at.
+    /// A capture was searched.
     Observed {
         id: CaptureId,
         /// What was looked for.

@@ -23,7 +23,7 @@ use crate::worker::newest::NewestWins;
 use crate::worker::started::Started;
 use crate::worker::{Busy, Clock, JOIN_DEADLINE, MAX_EVENTS, MAX_REQUESTS, POLL, Waker};
 
-/// Captures that may wait for the disk. The vision thread waits when there are more, and the next capture with it.
+/// Captures that may wait for the disk. The vision thread blocks when there are more, and so does the next capture.
 const MAX_CAPTURES: usize = 4;
 
 /// The application's end of these threads.
@@ -44,7 +44,7 @@ impl SessionThreads {
     /// Starts the threads. New sessions go under `sessions`.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system cannot start more threads.
     pub(crate) fn start(sessions: PathBuf, clock: &Clock, waker: &Waker) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
         let outlet = || Outlet { events: event_sender.clone(), waker: Arc::clone(waker), clock: Arc::clone(clock) };
@@ -115,7 +115,7 @@ impl SessionThreads {
         self.files.ask(task)
     }
 
-    /// Has captures looked at, these alone.
+    /// Has captures searched, these alone.
     pub(crate) fn observe(&mut self, job: ObserveJob) {
         self.observer.submit(job);
     }
@@ -125,7 +125,7 @@ impl SessionThreads {
         self.solver.submit(job);
     }
 
-    /// Has the next view chosen for a person who moves the robot.
+    /// Has the next view chosen for a robot that is moved by hand.
     pub(crate) fn choose_view(&mut self, job: HandJob) {
         self.chooser.submit(job);
     }
@@ -135,7 +135,7 @@ impl SessionThreads {
         self.importer.submit(job);
     }
 
-    /// No longer.
+    /// Cancels the import.
     pub(crate) fn cancel_import(&self) {
         self.importer.cancel();
     }
@@ -155,7 +155,7 @@ impl SessionThreads {
     /// Ends the threads, and waits for them no longer than until `end`. What was handed to the archive is still written;
     /// everything else is cancelled. Called again it does nothing.
     pub(crate) fn end(&mut self, end: Instant) {
-        // All parts by their names: one that was left out here would be waited for in vain.
+        // All parts by their names: one that is missing here would be waited for in vain.
         let Self { archive, captures: _, files, observer, solver, chooser, importer, events, sessions: _, threads } =
             self;
         observer.end();
@@ -165,7 +165,7 @@ impl SessionThreads {
         archive.close();
         files.close();
         for thread in threads.drain(..) {
-            // A thread whose report nobody takes would wait for ever.
+            // A thread whose reports are not taken would wait for ever.
             while thread.is_running() && Instant::now() < end {
                 let _dropped = events.recv_timeout(POLL).is_ok();
             }
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn threads_that_have_nothing_to_do_end_when_they_are_asked_to() {
-        // Far more than they take on a busy machine: one that is not asked waits for all of it.
+        // Far more than they take on a busy machine: one that is not asked to end waits for all of it.
         const LONG: Duration = Duration::from_mins(2);
         let folder = tempfile::tempdir().expect("a folder");
         let clock: Clock = Arc::new(|| 0.0);

@@ -1,4 +1,4 @@
-//! What the bars say about the session. The only place where they look at it.
+//! What the bars show about the session. The only place where they read it.
 
 use handeye_session::Edit;
 
@@ -19,7 +19,7 @@ pub struct SessionFacts {
     pub redo: Option<Text>,
 }
 
-/// What the model says. What it shows of a session is on the disk already.
+/// What the model contains. What it shows of a session is on the disk already.
 pub fn of(model: &Model) -> SessionFacts {
     let session = &model.session;
     SessionFacts {

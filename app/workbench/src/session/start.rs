@@ -1,4 +1,4 @@
-//! What a new session begins with.
+//! What a new session starts with.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +14,20 @@ use crate::model::Truth;
 /// The board of the reference scene.
 pub const BOARD: TargetSpec = TargetSpec::Chessboard(Grid { columns: 10, rows: 7, square_m: 0.015 });
 
-/// The ten reference poses, so that they are there wherever the binary is.
+/// The ten reference poses, embedded in the binary so that they are always available.
 pub const REFERENCE_POSES: &str = include_str!("../../../../assets/poses/seed10.toml");
 
-/// The arm of a cell, as its own kinematics has it. That of an arm with prismatic joints is of no use to an estimate of its errors.
+/// The arm of a cell, from its own kinematics. The model of an arm with prismatic joints is of no use to an estimate of its errors.
 pub fn arm(kinematics: Option<&ArmKinematics>) -> Option<ArmModel> {
     let of = |it: &ArmKinematics| {
-        // Where it stands and what its tool is follows from the captures.
+        // Its base and its tool follow from the captures.
         let arm = || it.arm().clone().mounted(Isometry3::identity(), Isometry3::identity());
         if it.is_ur5() { ArmModel::Kind(ArmKind::Ur5Coppeliasim) } else { ArmModel::Chain(Box::new(arm())) }
     };
     kinematics.filter(|it| it.kinds().all(|kind| kind == JointKind::Revolute)).map(of)
 }
 
-/// How the joints of an arm move, where a session has to say so: where they are others than six that turn.
+/// How the joints of an arm move, if a session has to record it: if they are not six revolute ones.
 pub fn joint_kinds(kinds: impl Iterator<Item = JointKind>) -> Option<Vec<JointKind>> {
     let kinds: Vec<JointKind> = kinds.collect();
     (kinds != [JointKind::Revolute; 6] && !kinds.is_empty()).then_some(kinds)

@@ -29,7 +29,7 @@ pub struct SessionState {
 }
 
 impl SessionState {
-    /// Name for people: that of its folder.
+    /// Name for display: that of its folder.
     pub fn name(&self) -> Option<String> {
         Some(self.folder.as_ref()?.file_name()?.to_string_lossy().into_owned())
     }
@@ -57,7 +57,7 @@ pub struct Observed {
     pub thumbnail: Arc<RgbImage>,
 }
 
-/// The capture whose image is looked at instead of the live one.
+/// The capture whose image is shown instead of the live one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Review {
     pub id: CaptureId,
@@ -65,12 +65,12 @@ pub struct Review {
     pub images: Option<Arc<FrameImages>>,
 }
 
-/// How the sequence of a pose went.
+/// The outcome of one pose of a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum StopOutcome {
-    /// The arm was there, and a capture was taken where one was asked for.
+    /// The arm was there, and a capture was taken if one was requested.
     Done,
-    /// It was left out, and this is why.
+    /// It was skipped, and this is why.
     Skipped(Text),
 }
 
@@ -79,7 +79,7 @@ pub enum StopOutcome {
 pub struct PoseSequence {
     /// The poses in their order.
     pub names: Vec<String>,
-    /// The joints at each \[rad\], of poses that were planned; `None` for taught ones, which the session has.
+    /// The joints at each \[rad\], for planned poses; `None` for taught ones, which the session has.
     pub planned: Option<Vec<JointValues>>,
     /// What is captured at each; `None` only moves.
     pub purpose: Option<CapturePurpose>,
@@ -87,7 +87,7 @@ pub struct PoseSequence {
     pub outcomes: Vec<StopOutcome>,
     /// When it began.
     pub began_s: f64,
-    /// What chooses its poses on the way; `None` where they are known from the beginning.
+    /// What chooses its poses along the way; `None` where they are known from the beginning.
     #[serde(skip)]
     pub guided: Option<Box<GuidedProgress>>,
 }
@@ -98,7 +98,7 @@ impl PoseSequence {
         self.names.get(self.outcomes.len()).map(String::as_str)
     }
 
-    /// Why the pose before was left out, where it was.
+    /// Why the previous pose was skipped, if it was.
     pub fn last_skipped(&self) -> Option<&Text> {
         match self.outcomes.last()? {
             StopOutcome::Skipped(why) => Some(why),
@@ -106,13 +106,13 @@ impl PoseSequence {
         }
     }
 
-    /// Whether there is something to go on with once it was broken off: poses that are left, or, where they are chosen on the
+    /// Whether there is something to continue after an interruption: poses that are left, or, where they are chosen along the
     /// way, the choice of the next one or of one to check the answer at.
     pub fn can_continue(&self) -> bool {
         self.guided.as_deref().map_or(self.current().is_some(), |guided| !guided.is_over)
     }
 
-    /// Whether it leads to poses that were planned to verify at.
+    /// Whether it visits poses that were planned for verification.
     pub fn is_planned(&self) -> bool {
         self.planned.is_some() && self.guided.is_none()
     }
@@ -135,7 +135,7 @@ pub enum FolderKind {
     Images,
     /// Something else.
     Plain,
-    /// No folder but a file of taught poses.
+    /// A file of taught poses, not a folder.
     File,
 }
 

@@ -67,22 +67,22 @@ pub(crate) fn absorb(cx: &mut Context, event: Event) {
     }
 }
 
-/// What a new session begins with, by what is known of the cell.
+/// What a new session starts with, given what is known about the cell.
 fn beginning(model: &Model) -> Box<Beginning> {
     let cell = model.cell.as_ref();
     let mut meta = start::meta(cell.and_then(|cell| cell.truth.as_ref()), timestamp_rfc3339());
     meta.arm = start::arm(cell.and_then(|cell| cell.arm.as_ref()));
     meta.joint_kinds = cell.and_then(|cell| start::joint_kinds(cell.joints.iter().map(|joint| joint.kind)));
-    // They would send any other arm somewhere.
+    // They would send any other arm to an arbitrary place.
     let poses = if model.has_reference_poses() { reference_poses() } else { Vec::new() };
     let cell = model.taught_on(meta.target);
     let taught = poses.into_iter().map(|pose| TaughtPose { cell: cell.clone(), ..pose }).collect();
     Box::new(Beginning { meta, taught })
 }
 
-/// Says what a session begins with while nothing was captured in it.
+/// Sets what a session starts with while nothing was captured in it.
 pub(crate) fn prepare_session(model: &mut Model, desk: &SessionThreads) {
-    // An arm that may still turn out to be known is not yet an arm that is not.
+    // An arm that may still turn out to be known is not yet an unknown one.
     let is_settled = model.cell.as_ref().is_some_and(|cell| !matches!(cell.arm_doubt, Some(ArmDoubt::Open)));
     if model.session.folder.is_none() || is_settled {
         ask_archive(model, desk, ArchiveTask::Prepare(beginning(model)));
@@ -137,7 +137,7 @@ fn new_session(model: &mut Model, desk: &SessionThreads, folder: Option<PathBuf>
     ask_archive(model, desk, ArchiveTask::New { folder, beginning: beginning(model) });
 }
 
-/// Goes on with a session; a data set is copied into one.
+/// Continues a session; a data set is copied into one.
 fn open(model: &mut Model, desk: &SessionThreads, reach: Option<&Reach>, folder: PathBuf) {
     model.opening = true;
     let bounds = bounds_of(reach, &folder);
@@ -150,7 +150,7 @@ fn open_sample(model: &mut Model, desk: &SessionThreads) {
     ask_archive(model, desk, ArchiveTask::Sample);
 }
 
-/// Goes on with the session in a folder, or begins one there.
+/// Continues the session in a folder, or starts one there.
 pub(crate) fn open_or_begin(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
     model.opening = true;
     ask_archive(model, desk, ArchiveTask::OpenOrNew { folder, beginning: beginning(model) });
@@ -166,13 +166,13 @@ pub(crate) fn list_folder(model: &mut Model, desk: &SessionThreads, folder: Path
     model.notify_if_refused(text!("The folder was not read"), asked);
 }
 
-/// Shows a folder in the program of the system for that.
+/// Shows a folder in the system's file manager.
 fn open_folder(model: &mut Model, desk: &SessionThreads, folder: PathBuf) {
     let asked = desk.files(FileTask::OpenFolder(folder));
     model.notify_if_refused(text!("The folder was not opened"), asked);
 }
 
-/// The document is now like this, on the disk.
+/// The document on the disk has changed.
 fn document_changed(cx: &mut Context, state: SessionState) {
     let before = std::mem::replace(&mut cx.model.session, state);
     let (old, new) = (&before.document, Arc::clone(&cx.model.session.document));
@@ -182,7 +182,7 @@ fn document_changed(cx: &mut Context, state: SessionState) {
         cx.model.observed.clear();
     }
     if before.folder.is_some() && (old.meta.target != new.meta.target || old.meta.mode != new.meta.mode) {
-        // Also by undo: what was chosen is of another board, or of another end of the arm.
+        // Also by undo: the choices were made for another board, or for another end of the arm.
         forget_guided(&mut cx.model, &cx.workers);
     }
     if old.captures != new.captures || old.meta != new.meta {
@@ -192,7 +192,7 @@ fn document_changed(cx: &mut Context, state: SessionState) {
         forget_solve(cx);
         cx.model.export.written = None;
         cx.model.picked = None;
-        // Its poses are those of the other session.
+        // Its poses belong to the other session.
         cx.model.sequence = None;
         cx.model.sequence_runs = false;
         cx.model.asked = None;
@@ -243,7 +243,7 @@ fn session_failed(model: &mut Model, why: Text) {
     model.notify(Severity::Error, why);
 }
 
-/// Has the captures looked at that nobody has looked at for the present target.
+/// Has the captures searched that have not been searched for the present target.
 fn observe_missing(model: &mut Model, desk: &mut SessionThreads) {
     let Some(folder) = model.session.folder.clone() else { return };
     let document = Arc::clone(&model.session.document);
@@ -291,14 +291,14 @@ fn reviewed(model: &mut Model, id: CaptureId, images: Option<Arc<FrameImages>>) 
     }
 }
 
-/// Tells the threads that look for the board what it is.
+/// Notifies the threads that look for the board of the target.
 pub(crate) fn send_target(model: &mut Model, workers: &Workers) {
     let target = model.document().meta.target;
     let asked = workers.ask_vision(VisionTask::SetTarget(target));
     model.notify_if_refused(text!("The target was not changed"), asked);
 }
 
-/// Tells them what the camera is.
+/// Notifies them of the camera's intrinsics.
 pub(crate) fn send_intrinsics(model: &mut Model, workers: &Workers) {
     let Some(intrinsics) = model.intrinsics() else { return };
     let asked = workers.ask_vision(VisionTask::SetIntrinsics(intrinsics));

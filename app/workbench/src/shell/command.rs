@@ -1,4 +1,4 @@
-//! What may be wanted of the window around the panes.
+//! Commands of the window around the panes.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use crate::text::Language;
 pub enum Command {
     /// Light or dark.
     SetTheme(ThemeChoice),
-    /// Of all words.
+    /// Language of all texts.
     SetLanguage(Language),
     /// How rotations are written.
     SetRotationFormat(RotationFormat),
@@ -22,6 +22,6 @@ pub enum Command {
     SetDialog(Option<Dialog>),
     /// Bring a pane to the front.
     ShowPane(Pane),
-    /// Put every pane where it was at first.
+    /// Put every pane back to its initial place.
     ResetLayout,
 }

@@ -1,4 +1,4 @@
-//! The way from a connection to exported files, and the parts of the window.
+//! The steps from a connection to exported files, and the parts of the window.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ pub enum Step {
     /// Reach robot and camera.
     #[default]
     Connect,
-    /// Say what is looked at.
+    /// Choose the target.
     Target,
     /// Take images from many poses.
     Capture,
@@ -43,7 +43,7 @@ pub enum Pane {
     Log,
     /// Which cell.
     Connect,
-    /// What is looked at, and what is known of the camera.
+    /// The target, and what is known about the camera.
     Target,
     /// Moves the arm by hand.
     Jog,
@@ -55,7 +55,7 @@ pub enum Pane {
     Verify,
     /// Files.
     Export,
-    /// The board as it is tracked, and the arm that follows it.
+    /// The tracked board, and the arm that follows it.
     Track,
     /// Arm, cameras and board in three dimensions.
     Scene,
@@ -84,18 +84,18 @@ impl Pane {
 /// Windows over the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Dialog {
-    /// All commands, to type for.
+    /// All commands, with a text filter.
     Palette,
     /// All keys.
     Help,
     About,
-    /// The address of the web viewer, where no browser shows it by itself.
+    /// The address of the web viewer, if it is not opened in a browser automatically.
     RerunAddress,
     /// Where a new session goes.
     New,
     /// Which session or data set to open.
     Open,
-    /// What a recording means that is to be imported.
+    /// What a recording means that should be imported.
     Import,
     /// Where a copy of the session goes.
     SaveAs,

@@ -14,7 +14,7 @@ pub(crate) fn apply(model: &mut Model, desk: &SessionThreads, command: Command) 
         Command::SetRotationFormat(format) => model.view.rotation = format,
         Command::GoToStep(step) => model.step = step,
         Command::SetDialog(dialog) => set_dialog(model, desk, dialog),
-        // Where panes are is the window's business.
+        // The places of the panes are kept by the window.
         Command::ShowPane(_) | Command::ResetLayout => {}
     }
 }

@@ -1,4 +1,4 @@
-//! What may be wanted of the calibration, and what is reported.
+//! Commands and events of the calibration.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub enum Command {
     Solve,
     /// Stop solving.
     Cancel,
-    /// Which answer is asked for, by its name.
+    /// Which answer is requested, by its name.
     SetMethod(String),
     /// Whether views and corners that do not fit the others stay in the answer.
     SetKeepOutliers(bool),
@@ -32,7 +32,7 @@ pub enum Command {
 /// What has happened to the calibration.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Event {
-    /// A solve goes on.
+    /// Progress of a solve.
     Progress {
         job: JobId,
         /// What it does.

@@ -1,4 +1,4 @@
-//! What the joint estimate decided and found out besides the answer, in words with units.
+//! What the joint estimate decided and found in addition to the answer, in words with units.
 
 use handeye_estimate::diagnose::Calibration;
 use handeye_estimate::diagnose::findings::WIDENING_WORTH_SAYING;
@@ -10,10 +10,10 @@ use handeye_wording::shown;
 use crate::text::Text;
 use handeye_wording::text;
 
-/// From so many degrees of freedom on the normal law is as good.
+/// From this many degrees of freedom on the normal distribution is as good.
 const GAUSSIAN: f64 = 1e5;
 
-/// One thing to say.
+/// One thing to report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EstimatedValue {
     pub what: Text,
@@ -24,7 +24,7 @@ pub struct EstimatedValue {
     pub why: Option<Text>,
 }
 
-/// All of it, one line each; nothing is said of what is as usual.
+/// All of it, one line each; what is as usual is not reported.
 pub fn estimated(calibration: &Calibration, depth: Option<&DepthReport>) -> Vec<EstimatedValue> {
     let mut lines = Vec::new();
     lines.extend(views_aside(calibration));

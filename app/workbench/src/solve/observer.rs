@@ -1,4 +1,4 @@
-//! The observer: looks for the board in captures that were opened from the disk, or again when the target is another.
+//! The observer: looks for the board in captures that were opened from the disk, or again when the target has changed.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::text::Text;
 use crate::worker::link::Outlet;
 use handeye_wording::text;
 
-/// Captures to look at.
+/// Captures to search.
 pub struct ObserveJob {
     /// The session.
     pub folder: PathBuf,
@@ -26,7 +26,7 @@ pub struct ObserveJob {
     pub captures: Vec<CaptureRecord>,
 }
 
-/// Looks at one capture after the other and reports each.
+/// Searches one capture after the other and reports each.
 pub fn observe(job: &ObserveJob, cancel: &CancelToken, outlet: &Outlet) {
     for capture in &job.captures {
         if cancel.is_cancelled() {

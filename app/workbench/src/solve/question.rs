@@ -4,7 +4,7 @@ use handeye_session::{CaptureId, Role};
 
 use crate::model::Goal;
 
-/// What a calibration depends on. When it is another, there is something to solve.
+/// What a calibration depends on. When it changes, there is something to solve.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Question {
     pub meta:

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::Text;
 
-/// Counts solves, so that what is reported can be told from what came before.
+/// Counts solves, to distinguish reports from those of earlier solves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct JobId(pub u64);
 
@@ -26,15 +26,15 @@ pub struct Solved {
     pub calibration: Calibration,
     /// The document that is exported and compared.
     pub result: CalibrationResult,
-    /// What goes with commands that are corrected for the errors of the arm; `None` where these are not known or not to be counted on.
+    /// What is needed for commands that are corrected for the errors of the arm; `None` where these are not known or not reliable.
     pub corrected: Option<Arc<Corrected>>,
     /// What is weak and what to do next.
     pub findings: Vec<Finding>,
-    /// The calibration as what predicts and measures; `None` without a hand-eye.
+    /// The calibration, for predicting and measuring; `None` without a hand-eye.
     pub calibrated: Option<Predictor>,
     /// How well it does on captures that never entered the fit; `None` while there are none.
     pub verification: Option<Result<Verification, VerifyError>>,
-    /// What the depths of the captures say of a depth camera; `None` where they have none.
+    /// What the depths of the captures show about a depth camera; `None` if they have none.
     pub depth: Option<DepthReport>,
     /// The captures of `verification` in its order.
     pub verified_captures: Vec<CaptureId>,
@@ -42,26 +42,27 @@ pub struct Solved {
     pub took_s: f64,
 }
 
-/// What goes with commands that are corrected for the errors of the arm.
+/// What is needed for commands that are corrected for the errors of the arm.
 #[derive(Debug, Clone)]
 pub struct Corrected {
     /// The arm with its errors.
     pub arm: Arc<CorrectedArm>,
-    /// The calibration as what predicts and measures by corrected tip poses.
+    /// The calibration, for predicting and measuring with corrected tip poses.
     pub calibrated: Predictor,
-    /// As [`Solved::verification`]; `None` also where the joints of a capture are not known.
+    /// As [`Solved::verification`]; `None` also if the joints of a capture are not known.
     pub verification: Option<Verification>,
 }
 
 impl Solved {
-    /// The verification by the tip poses that tools are sent by: corrected ones, where these are expected to bring the tip nearer.
+    /// The verification with the tip poses that tools are commanded by: corrected ones, if these are expected to bring the tip
+    /// nearer.
     pub fn verification_in_use(&self) -> Option<&Verification> {
         let corrected = self.corrected.as_ref().filter(|_| self.result.quality.correcting_helps());
         let corrected = corrected.and_then(|corrected| corrected.verification.as_ref());
         corrected.or_else(|| self.verification.as_ref()?.as_ref().ok())
     }
 
-    /// The error that a goal \[m\] is asked of; `None` where none may be stated.
+    /// The error that a goal \[m\] is compared with; `None` if none may be stated.
     pub fn promised(&self, goal_m: f64) -> Option<Promised> {
         let quality = &self.result.quality;
         let metres = |mm: Option<f64>| mm.map(|mm| mm * 1e-3);
@@ -77,7 +78,7 @@ pub enum SolveStatus {
     /// Nothing to do.
     #[default]
     Idle,
-    /// It is at work.
+    /// It is running.
     Running {
         job: JobId,
         /// What it does.
@@ -103,17 +104,17 @@ pub struct SolveState {
     pub status: SolveStatus,
     /// The newest answer.
     pub solved: Option<Arc<Solved>>,
-    /// Whether that answer is that of the present set of captures.
+    /// Whether that answer is for the present set of captures.
     pub fresh: bool,
 }
 
 impl SolveState {
-    /// The answer of the present set.
+    /// The answer for the present set.
     pub fn current(&self) -> Option<&Arc<Solved>> {
         self.solved.as_ref().filter(|_| self.fresh)
     }
 
-    /// Whether it is at work.
+    /// Whether it is running.
     pub fn is_running(&self) -> bool {
         matches!(self.status, SolveStatus::Running { .. })
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::Solved;
 
-/// Half a side of the box that is judged before anybody says which \[m\].
+/// Half a side of the box that is judged before one is chosen \[m\].
 const HALF_SIDE_M: f64 = 0.1;
 
 /// A box, its sides along the axes of the base.
@@ -26,13 +26,13 @@ pub struct WorkBox {
 /// The box and how well points in it are measured.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BoxState {
-    /// The box that was chosen; `None` is the one about the target.
+    /// The chosen box; `None` for the one about the target.
     pub chosen: Option<WorkBox>,
     /// The box that is judged and the error over it; `None` while no uncertainty is stated.
     pub judged: Option<(WorkBox, BoxError)>,
 }
 
-/// The expected error (95 %) over a box; without one over that about where the target was seen. `None` where the
+/// The expected error (95 %) over a box; without one, over the box about where the target was seen. `None` where the
 /// calibration states no uncertainty.
 pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) -> Option<(WorkBox, BoxError)> {
     let calibration = &solved.calibration;
@@ -49,8 +49,8 @@ pub fn judge_box(chosen: Option<WorkBox>, solved: &Solved, document: &Document) 
 
 /// Where the camera sees a box. `None` where the calibration has no covariance.
 ///
-/// A camera on the tip sees the box from many places, and the error of a point depends on where it is in the camera. That
-/// place of a capture counts from which the middle of the box is known worst.
+/// A camera on the tip sees the box from many places, and the error of a point depends on where it is in the camera. The
+/// capture that counts is the one from which the centre of the box is known worst.
 pub fn in_camera(work_box: &WorkBox, solved: &Solved, document: &Document) -> Option<TipBox> {
     let covariance = *solved.calibration.hand_eye_covariance()?;
     let (from, to) = (Point3::from(work_box.from_m), Point3::from(work_box.to_m));
@@ -63,7 +63,7 @@ pub fn in_camera(work_box: &WorkBox, solved: &Solved, document: &Document) -> Op
     Some(TipBox::in_base(from, to, &worst))
 }
 
-/// From where the base was seen by the captures of the fit; once for a camera that stands still.
+/// From where the base was seen by the captures of the fit; once for a camera that is fixed.
 fn views_of_base(hand_eye: &HandEye, solved: &Solved, document: &Document) -> Vec<Pose<Camera, Base>> {
     match *hand_eye {
         HandEye::EyeToHand { base_from_camera, .. } => vec![base_from_camera.inverse()],

@@ -1,4 +1,4 @@
-//! Solving by itself whenever the set of captures is another.
+//! Solves automatically whenever the set of captures changes.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ pub(crate) fn apply(model: &mut Model, desk: &mut SessionThreads, numbers: &mut 
     }
 }
 
-/// Takes in how a solve goes on.
+/// Takes in the progress of a solve.
 pub(crate) fn absorb(cx: &mut Context, event: Event) {
     match event {
         Event::Progress { job, stage, part } => solve_progress(&mut cx.model, job, stage, part),
@@ -60,7 +60,7 @@ fn question(model: &Model) -> Question {
     }
 }
 
-/// Solves unless the answer to the present question is there or on its way.
+/// Solves unless the answer to the present question is available or on its way.
 pub(crate) fn solve_if_changed(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
     // Half of a session that was just opened would give half an answer.
     let document = model.document();
@@ -80,7 +80,7 @@ fn solve_again(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbe
 }
 
 fn solve(model: &mut Model, desk: &mut SessionThreads, numbers: &mut Numbers) {
-    // From here on what an earlier job reports is of no interest.
+    // From here on reports of an earlier job are ignored.
     numbers.job = JobId(numbers.job.0 + 1);
     let id = numbers.job;
     model.solve.fresh = false;
@@ -129,7 +129,7 @@ pub(crate) fn seen(model: &Model, document: &Document) -> SessionObservations {
     document.observations(image_size(model), |id| sight(model, id))
 }
 
-/// Whether the present question was asked, of captures that have all been looked at.
+/// Whether the present question was asked, with captures that have all been searched.
 pub(crate) fn is_asked(model: &Model, numbers: &Numbers) -> bool {
     let document = model.document();
     let are_seen = document.captures.iter().all(|it| model.observed.contains_key(&it.id));
@@ -157,7 +157,7 @@ fn image_size(model: &Model) -> (u32, u32) {
     model.observed.values().flatten().map(|observed| observed.image_size).next().unwrap_or_default()
 }
 
-/// Forgets question and answer: they are of another session.
+/// Clears question and answer: they belong to another session.
 pub(crate) fn forget_solve(cx: &mut Context) {
     cx.desk.cancel_solve();
     cx.numbers.job = JobId(cx.numbers.job.0 + 1);
@@ -187,13 +187,13 @@ fn set_tip_box(model: &mut Model, chosen: Option<WorkBox>) {
     }
 }
 
-/// The box that was chosen, where the camera sees it by the newest answer: guided capture judges its goal over it.
+/// The chosen box as the camera sees it with the newest answer: guided capture judges its goal over it.
 pub(crate) fn chosen_box(model: &Model) -> Option<TipBox> {
     let (chosen, solved) = (model.tip_box.chosen?, model.solve.solved.as_deref()?);
     box_in_camera(&chosen, solved, model.document())
 }
 
-/// Some milliseconds, so only when box or answer are others.
+/// Takes some milliseconds, so only done when the box or the answer changes.
 fn judge_tip_box(model: &mut Model) {
     let judged = model.solve.solved.as_deref().and_then(|it| judge_box(model.tip_box.chosen, it, model.document()));
     model.tip_box.judged = judged;
@@ -215,7 +215,7 @@ fn solve_progress(model: &mut Model, job: JobId, now: Stage, now_part: f64) {
 }
 
 fn solve_ended(cx: &mut Context, job: JobId, outcome: SolveOutcome) {
-    // An answer to an earlier question is no longer of interest.
+    // The answer to an earlier question is ignored.
     if job != cx.numbers.job {
         return;
     }

@@ -24,30 +24,31 @@ use crate::truth;
 use crate::worker::link::Outlet;
 use handeye_wording::text;
 
-/// Progress is told when it has come so much further: a window that is drawn for every step would slow the solve down.
+/// Progress is reported when it has advanced by this much: a window that is drawn for every step would slow the solve
+/// down.
 const PROGRESS_STEP: f64 = 0.05;
 
 /// A set of captures to calibrate.
 pub struct SolveJob {
     /// Its number.
     pub id: JobId,
-    /// What was observed; captures that are left out are among the views.
+    /// What was observed; excluded captures are among the views.
     pub observations: Observations,
     /// The captures of the views.
     pub captures: Vec<CaptureId>,
     /// What was observed in captures that never enter the fit.
     pub verification: Vec<(CaptureId, View)>,
-    /// Which answer is asked for.
+    /// Which answer is requested.
     pub method: Method,
-    /// What is changed about it.
+    /// The changed options.
     pub options: Options,
     /// The error \[m\] that is good enough.
     pub goal_m: f64,
-    /// The arm, where the views know its joints.
+    /// The arm, if the views know its joints.
     pub arm: Option<ArmOfViews>,
-    /// How accurate the robot is, where something was said of it.
+    /// How accurate the robot is, if that was stated.
     pub robot_accuracy: Option<RobotAccuracy>,
-    /// For comparison with the answer, when that is there.
+    /// For comparison with the answer, once it is available.
     pub truth: Option<Truth>,
 }
 
@@ -66,7 +67,7 @@ pub fn solve(job: &SolveJob, cancel: &CancelToken, outlet: &Outlet) {
         }
     };
     let work = Work { cancel, progress: &progress };
-    // A defect in a solver must not take the captures with it.
+    // A bug in a solver must not cost the user the captures.
     let solved = catch_unwind(AssertUnwindSafe(|| answer(job, work)));
     let outcome = match solved {
         Ok(Ok(solved)) => SolveOutcome::Solved(Arc::new(Solved { took_s: outlet.now_s() - began_s, ..solved })),
@@ -150,7 +151,7 @@ pub fn examined(job: &SolveJob, fit: Fit, work: Work<'_>) -> Result<Solved, Cali
     })
 }
 
-/// What the depths of the captures in the fit say of a depth camera.
+/// What the depths of the captures in the fit show about a depth camera.
 fn depth_camera(job: &SolveJob, calibration: &Fit) -> Option<DepthReport> {
     let lens = calibration.intrinsics()?;
     let shape =
@@ -236,7 +237,7 @@ mod tests {
         assert!(examined(&job, fit, (&cancel).into()).is_err(), "it can be cancelled");
     }
 
-    /// A depth camera beside the lens: what it measured at the board stands beside what the calibration predicts.
+    /// A depth camera next to the lens: what it measured at the board is shown next to what the calibration predicts.
     #[test]
     fn the_depth_of_a_capture_for_verification_is_compared_with_that_of_the_board() {
         let depth = DepthImage::new(640, 480, vec![0.4; 640 * 480]).expect("as many as pixels");

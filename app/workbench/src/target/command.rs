@@ -1,4 +1,4 @@
-//! What may be wanted of the target.
+//! Commands of the target.
 
 use handeye_geometry::targets::TargetSpec;
 use handeye_print::Page;
@@ -11,6 +11,6 @@ use serde::{Deserialize, Serialize};
 pub enum Command {
     /// Another target.
     Set(TargetSpec),
-    /// Write the target for a printer, on such a page.
+    /// Write the target for a printer, on this page.
     Print(Page),
 }

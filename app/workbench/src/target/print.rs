@@ -13,7 +13,7 @@ use crate::worker::{FileTask, SessionThreads};
 use handeye_wording::Value;
 use handeye_wording::text;
 
-/// Writes it; gives what there is to say.
+/// Writes it; returns the report.
 pub(crate) fn write(target: &TargetSpec, page: Page, file: &Path) -> (Severity, Text) {
     match written(target, page, file) {
         Ok(()) => (
@@ -34,7 +34,7 @@ fn written(target: &TargetSpec, page: Page, file: &Path) -> Result<(), Value> {
     Ok(atomic_file::write(file, &target_pdf(target, page)?)?)
 }
 
-/// The name of its file, which tells boards apart.
+/// The name of its file, which distinguishes boards.
 fn file_name(target: &TargetSpec) -> String {
     let size = match target {
         TargetSpec::AprilTag(tag) => format!("{}", tag.id),
@@ -44,7 +44,7 @@ fn file_name(target: &TargetSpec) -> String {
     format!("{}_{size}.pdf", target.kind())
 }
 
-/// Writes the board of the session for a printer, into the session or beside the others.
+/// Writes the board of the session for a printer, into the session or next to the others.
 pub(crate) fn print_target(model: &mut Model, desk: &SessionThreads, page: Page) {
     let target = model.document().meta.target;
     let folder: &PathBuf = model.session.folder.as_ref().unwrap_or(&model.sessions);

@@ -18,16 +18,16 @@ impl Model {
             CellSource::Drivers(drivers) => drivers.to_string(),
         };
         let joints = cell.joints.iter().map(|joint| TaughtJoint { kind: joint.kind, range: joint.range });
-        // Behind a driver it is found while the arm moves, a little otherwise each time.
+        // Behind a driver it is estimated while the arm moves, slightly differently each time.
         let arm = cell.arm.as_ref().filter(|_| cell.moves == Moves::Freely);
         let at_zero =
             |arm: &ArmKinematics| <[f64; 3]>::from(arm.tip(&JointValues::zeros(cell.joints.len())).translation());
-        // Of another number of joints than the chain has there is no place.
+        // Undefined if the number of joints differs from that of the chain.
         let tip_at_zero_m = arm.map(at_zero).filter(|tip| tip.iter().all(|value| value.is_finite()));
         Some(TaughtOn { base, joints: joints.collect(), tip_at_zero_m, target })
     }
 
-    /// The taught poses of this cell; none before it is connected.
+    /// The taught poses of this cell; empty before it is connected.
     pub fn taught(&self) -> Vec<&TaughtPose> {
         let Some(cell) = self.taught_on(self.document().meta.target) else { return Vec::new() };
         self.document().taught.iter().filter(|pose| pose.is_of(Some(&cell))).collect()
@@ -40,7 +40,7 @@ impl Model {
     }
 }
 
-/// A scene by the name of its file or that it comes with.
+/// A scene by its file name or its built-in name.
 fn scene_name(scene: &SceneChoice) -> String {
     match scene {
         SceneChoice::Shipped(shipped) => shipped.name().to_owned(),

@@ -1,4 +1,4 @@
-//! What may be wanted of taught poses and sequences, and what is reported.
+//! Commands and events of taught poses and sequences.
 
 use std::path::PathBuf;
 
@@ -16,25 +16,25 @@ use crate::text::Text;
 pub enum Command {
     /// Remember the place of the arm as a taught pose.
     Teach {
-        /// Its name; one is found when there is none.
+        /// Its name; one is chosen if not given.
         name: Option<String>,
     },
     /// Forget a taught pose.
     Remove(String),
-    /// Call a taught pose something else.
+    /// Rename a taught pose.
     Rename {
-        /// Its name now.
+        /// Its present name.
         from: String,
-        /// Its name afterwards.
+        /// Its new name.
         to: String,
     },
-    /// Visit a taught pose earlier or later.
+    /// Change the position of a taught pose in the order.
     Reorder {
         name: String,
-        /// Its place afterwards, counted from 0.
+        /// Its new index, counted from 0.
         to: usize,
     },
-    /// The ten reference poses instead of those that are taught.
+    /// The ten reference poses instead of the taught ones.
     TeachReference,
     /// Take the taught poses of other cells for those of this one.
     Adopt,
@@ -49,11 +49,11 @@ pub enum Command {
         /// What is captured at each; `None` only moves.
         purpose: Option<CapturePurpose>,
     },
-    /// Go on with the sequence that was broken off, at the pose at which it was.
+    /// Continue the interrupted sequence, at the pose where it was.
     ContinueSequence,
     /// No more poses.
     StopSequence,
-    /// Have poses planned that are not in the fit, visit them, and capture for verification at each.
+    /// Plan poses that are not in the fit, visit them, and capture for verification at each.
     VerifyAtPlanned,
 }
 
@@ -62,7 +62,7 @@ pub enum Command {
 pub enum Event {
     /// Taught poses were read from a file.
     Read {
-        /// Them.
+        /// The poses.
         poses: Vec<TaughtPose>,
     },
     /// Poses to look at the board from were planned, or cannot be.

@@ -1,4 +1,4 @@
-//! Visiting all taught poses, or poses that are planned to verify at, with a capture at each.
+//! Visiting all taught poses, or poses that are planned for verification, with a capture at each.
 
 use handeye_arm::JointValues;
 use handeye_coppeliasim::cell::BoardInView;
@@ -20,9 +20,9 @@ use crate::text::Text;
 use crate::worker::{ViewsRequest, Workers};
 use handeye_wording::text;
 
-/// Poses that are planned to verify at: enough for an average and a scatter, and over within a minute or two.
+/// Poses that are planned for verification: enough for an average and a scatter, and over within a minute or two.
 const VERIFYING: usize = 5;
-/// Chooses them: the same question gets the same poses.
+/// Seed for choosing them: the same question gets the same poses.
 const VIEWS_SEED: u64 = 1;
 
 pub(crate) fn run_sequence(cx: &mut Context, purpose: Option<CapturePurpose>) {
@@ -41,7 +41,7 @@ pub(crate) fn run_sequence(cx: &mut Context, purpose: Option<CapturePurpose>) {
 }
 
 pub(crate) fn begin_sequence(cx: &mut Context, sequence: PoseSequence) {
-    // What the arm does is then no longer what a person does.
+    // From here on the arm is no longer moved by hand.
     cx.model.by_hand = None;
     cx.model.sequence = Some(sequence);
     cx.model.sequence_runs = true;
@@ -49,10 +49,10 @@ pub(crate) fn begin_sequence(cx: &mut Context, sequence: PoseSequence) {
     next_stop(cx);
 }
 
-/// Goes on with a sequence that was broken off: the pose at which that was is visited again.
+/// Continues an interrupted sequence: the pose where it was interrupted is visited again.
 pub(crate) fn continue_sequence(cx: &mut Context) {
     if cx.model.capture.is_some() {
-        // It would be taken for that of the pose.
+        // It would be taken for the capture of the pose.
         return cx.model.notify(Severity::Warning, text!("A capture is under way: wait until it is kept"));
     }
     if continue_guided(cx) {
@@ -66,7 +66,7 @@ pub(crate) fn continue_sequence(cx: &mut Context) {
     }
 }
 
-/// Has poses planned that differ from all captures, to verify at.
+/// Plans poses that differ from all captures, for verification.
 pub(crate) fn plan_verification(model: &mut Model, workers: &Workers, numbers: &mut Numbers) {
     if model.sequence_runs || model.planning {
         return;
@@ -96,7 +96,7 @@ pub(crate) fn plan_verification(model: &mut Model, workers: &Workers, numbers: &
 
 /// The poses are planned, or cannot be.
 pub(crate) fn planned(cx: &mut Context, id: MotionId, views: Result<Vec<JointValues>, Text>) {
-    // After a stop nothing begins by itself now.
+    // After a stop nothing starts by itself.
     if cx.numbers.plan != Some(id) || !cx.model.planning {
         return;
     }
@@ -135,7 +135,7 @@ pub(crate) fn stop_sequence(model: &mut Model, workers: &Workers) {
     }
 }
 
-/// Sets out for the next pose, or ends the sequence.
+/// Starts towards the next pose, or ends the sequence.
 pub(crate) fn next_stop(cx: &mut Context) {
     let Some(sequence) = cx.model.sequence.as_ref().filter(|_| cx.model.sequence_runs) else { return };
     if let Some(name) = sequence.current() {
@@ -178,7 +178,7 @@ pub(crate) fn end_stop(cx: &mut Context, outcome: StopOutcome) {
 pub(crate) fn sequence_moved(cx: &mut Context, outcome: &MotionOutcome) {
     let Some(sequence) = &cx.model.sequence else { return };
     if sequence.current().is_none() {
-        // No pose is under way but the choice of one, and that ended without one.
+        // No pose is under way, only the choice of one, and that ended without a result.
         return break_off(&mut cx.model, outcome.why().cloned());
     }
     let (purpose, name) = (sequence.purpose, sequence.current().map(str::to_owned));
@@ -190,7 +190,7 @@ pub(crate) fn sequence_moved(cx: &mut Context, outcome: &MotionOutcome) {
                 None => end_stop(cx, StopOutcome::Done),
             }
         }
-        // A pose that cannot be reached is left out; the others can still be visited.
+        // A pose that cannot be reached is skipped; the others can still be visited.
         MotionOutcome::Refused(why) if guided_was_refused(&mut cx.model) => break_off(&mut cx.model, Some(why.clone())),
         MotionOutcome::Refused(why) | MotionOutcome::Unreached(why) => {
             end_stop(cx, StopOutcome::Skipped(why.clone()));
@@ -203,7 +203,7 @@ pub(crate) fn sequence_moved(cx: &mut Context, outcome: &MotionOutcome) {
 
 /// The capture of the sequence is on the disk.
 pub(crate) fn sequence_captured(cx: &mut Context) {
-    // One that somebody took between two poses is none of the sequence's.
+    // One that the user took between two poses does not belong to the sequence.
     let is_at_pose = cx.model.sequence.as_ref().is_some_and(|sequence| sequence.current().is_some());
     if cx.model.sequence_runs && is_at_pose {
         end_stop(cx, StopOutcome::Done);
@@ -222,7 +222,7 @@ pub(crate) fn sequence_refused(cx: &mut Context, refused: &CaptureRefused) {
     }
 }
 
-/// Ends a sequence before its end, and says why where that is known.
+/// Interrupts a sequence, and reports why if that is known.
 pub(crate) fn break_off(model: &mut Model, why: Option<Text>) {
     model.sequence_runs = false;
     model.asked = None;
@@ -234,7 +234,7 @@ pub(crate) fn break_off(model: &mut Model, why: Option<Text>) {
     model.notify_in(pane, Severity::Warning, reported);
 }
 
-/// Where it says how it went.
+/// The pane that reports how it went.
 fn pane_of(sequence: &PoseSequence) -> Pane {
     match sequence {
         sequence if sequence.guided.is_some() => Pane::Poses,

@@ -55,7 +55,7 @@ pub(crate) fn absorb(cx: &mut Context, event: Event) {
     }
 }
 
-/// These are the poses of this cell now; those of others stay.
+/// The poses of this cell become these; those of others stay.
 fn edit_taught(model: &mut Model, desk: &SessionThreads, change: TaughtChange, poses: Vec<TaughtPose>) {
     let Some(cell) = model.taught_on(model.document().meta.target) else {
         return model.notify(Severity::Warning, text!("Taught poses belong to an arm: connect it first"));
@@ -70,7 +70,7 @@ fn taught(model: &Model) -> Vec<TaughtPose> {
     model.taught().into_iter().cloned().collect()
 }
 
-/// Joints are remembered and not the tip, because they bring the arm back on the same way.
+/// Stores the joints and not the tip, because they bring the arm back the same way.
 fn teach(model: &mut Model, desk: &SessionThreads, name: Option<String>) {
     let Some(robot) = &model.robot else {
         model.notify(Severity::Warning, text!("The position of the arm is not known: connect first"));
@@ -116,7 +116,7 @@ fn teach_reference(model: &mut Model, desk: &SessionThreads) {
     }
 }
 
-/// A person says that arm, base and target are as they were where the poses were taught.
+/// The user states that arm, base and target are as they were where the poses were taught.
 fn adopt_taught(model: &mut Model, desk: &SessionThreads) {
     let Some(cell) = model.taught_on(model.document().meta.target) else { return };
     let fits = |pose: &&TaughtPose| match &pose.goal {

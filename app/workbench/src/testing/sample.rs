@@ -55,7 +55,7 @@ pub fn intrinsics() -> Intrinsics {
     Intrinsics::pinhole(640, 480, 589.37)
 }
 
-/// View number `n`: the board tilted and turned in another way each time.
+/// View number `n`: the board tilted and turned differently each time.
 fn camera_from_target(n: u32) -> Pose<Camera, Target> {
     let n = f64::from(n);
     let turn = UnitQuaternion::from_euler_angles(0.45 * (1.7 * n).sin(), 0.45 * (2.3 * n).cos(), 0.5 * (0.9 * n).sin());
@@ -75,7 +75,7 @@ fn corners(n: u32) -> Corners {
     corners_at(n, &camera_from_target(n))
 }
 
-/// The same of a board elsewhere.
+/// The same for a board elsewhere.
 fn corners_at(n: u32, chain: &Pose<Camera, Target>) -> Corners {
     // Independent from corner to corner and from view to view: a pattern would be an error of the print.
     let noise_px = |i: usize, axis: u64| {
@@ -189,7 +189,7 @@ pub fn connected() -> Model {
     model
 }
 
-/// Ten captures of the fit and two that verify it, on the disk and looked at, not solved.
+/// Ten captures of the fit and two that verify it, on the disk and searched, not solved.
 pub fn captured() -> Model {
     let mut model = connected();
     let mut document = Document::new(start::meta(None, String::new()));
@@ -214,7 +214,7 @@ pub fn images_alone() -> Model {
     model
 }
 
-/// What is to be reached.
+/// The goal.
 const FINDINGS: FindingOptions = FindingOptions::with_goal_mm(Some(0.5));
 
 /// What was seen in the captures of the fit.
@@ -315,7 +315,7 @@ pub fn with_errors_of_the_arm() -> Model {
 /// The capture that does not fit the others in [`with_an_outlier`].
 pub const OUTLIER: CaptureId = CaptureId(3);
 
-/// The same, with a capture that the estimate left out as an outlier: its board is 12.3 mm and 1.5° from where the others put it.
+/// The same, with a capture that the estimate excluded as an outlier: its board is 12.3 mm and 1.5° from where the others put it.
 pub fn with_an_outlier() -> Model {
     let mut model = solved();
     let mut solved = Solved::clone(model.solve.current().expect("solved"));

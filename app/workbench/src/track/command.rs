@@ -1,4 +1,4 @@
-//! What may be wanted of tracking and following the board, and what is reported.
+//! Commands and events of tracking and following the board.
 
 use std::sync::Arc;
 
@@ -12,13 +12,13 @@ use crate::text::Text;
 #[cfg_attr(feature = "testing", derive(strum::EnumDiscriminants))]
 #[cfg_attr(feature = "testing", strum_discriminants(name(CommandKind), derive(PartialOrd, Ord, strum::EnumIter)))]
 pub enum Command {
-    /// Track the board in every image, or no more.
+    /// Track the board in every image, or stop tracking.
     SetTracking(bool),
-    /// Have the arm follow the board; `None` has it come to rest.
+    /// Make the arm follow the board; `None` brings it to rest.
     SetFollow(Option<FollowRequest>),
-    /// Correct tip poses and what the arm is sent for the errors of the arm, or take them as they are reported.
+    /// Correct tip poses and commands for the errors of the arm, or use them as they are reported.
     SetCorrected(bool),
-    /// Have the simulated cell move its board.
+    /// Make the simulated cell move its board.
     MoveBoard(BoardMotion),
     /// Hide the board of the simulated cell, or show it again.
     HideBoard(bool),
@@ -30,12 +30,12 @@ pub enum Event {
     /// The board in the newest image that was tracked.
     #[serde(skip)]
     Tracked(Arc<Tracked>),
-    /// The board is tracked no more.
+    /// The board is no longer tracked.
     Failed {
         /// Why, and what to do.
         why: Text,
     },
-    /// The arm follows the board, or does not.
+    /// The arm follows the board, or has stopped.
     #[serde(skip)]
     Follow(FollowStatus),
 }

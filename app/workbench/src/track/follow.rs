@@ -1,4 +1,4 @@
-//! An arm that goes along with the board.
+//! An arm that follows the board.
 
 use handeye_coppeliasim::CancelToken;
 use handeye_coppeliasim::cell::{FollowEnd, FollowMoment, FollowRequest as ArmRequest};
@@ -7,9 +7,9 @@ use handeye_link::{MotionGoal, MotionOutcome, MotionPort, PortError, Room};
 use super::follow_line::FollowLine;
 use crate::model::FollowRequest;
 
-/// Has the arm do what is wished about the board that is tracked, from a place where it has room if that is wished, to which it
-/// moves at a share of its fastest speed; `makes_room` hears of that beforehand. Returns when the arm stands: how following ended,
-/// or why it was not begun or failed.
+/// Makes the arm do what is requested about the tracked board, from a place where it has room if that is requested, to which it
+/// moves at a share of its fastest speed; `makes_room` is notified beforehand. Returns when the arm is at rest: how following
+/// ended, or why it was not begun or failed.
 ///
 /// # Errors
 /// [`PortError::Lost`] and the like.

@@ -1,5 +1,5 @@
-//! The way of the tracked board to the arm: what the vision thread saw last, and where the tip has to be for it. It goes
-//! past the window, which may be busy. No thread, no clock: time is that of the simulation.
+//! The path of the tracked board to the arm: what the vision thread saw last, and where the tip has to be for it. It
+//! bypasses the window, which may be busy. No thread, no clock: time is that of the simulation.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -13,15 +13,16 @@ use crate::model::{FollowRequest, FollowStatus};
 use crate::text::Text;
 use handeye_wording::text;
 
-/// How far \[s\] the motion of the board is thought on from the newest image: a few images, so that one that comes late
-/// does not end everything, and less than what an arm at its speed limit makes of a wrong guess.
+/// How far \[s\] the motion of the board is extrapolated from the newest image: a few images, so that a late one does
+/// not end everything, and less than the distance an arm at its speed limit could go because of a wrong guess.
 const LONGEST_GUESS_S: f64 = 0.4;
 
-/// How long \[s\] an arm stands and waits for the board to be seen: after it was moved to another place, and where the board is lost
-/// or images are late on the way. The whole image is searched within a few images, and who covered the board by mistake uncovers it.
+/// How long \[s\] an arm at rest waits for the board to be seen: after it was moved to another place, and where the board is lost
+/// or images are late during the motion. The whole image is searched within a few images, and a board that was covered by mistake
+/// is uncovered.
 const PATIENCE_S: f64 = 3.0;
 
-/// What the arm is to do about the board.
+/// What the arm should do about the board.
 #[derive(Default)]
 pub struct FollowLine {
     inner: Mutex<Inner>,
@@ -33,11 +34,11 @@ struct Inner {
     newest: Option<Update>,
     rest: Rest,
     aim: Option<Aim>,
-    /// For so long the board may be out of sight before the first goal \[s\].
+    /// How long the board may be out of sight before the first goal \[s\].
     patience_s: f64,
-    /// Until then, once there was a pass.
+    /// Deadline for that, once there was a pass.
     waits_until_s: Option<f64>,
-    /// Since when there has been no goal on the way \[s\].
+    /// Since when there has been no goal during the motion \[s\].
     without_goal_since_s: Option<f64>,
     ended: Option<Text>,
     status: Option<FollowStatus>,
@@ -81,7 +82,7 @@ impl FollowLine {
         self.inner().newest.as_ref().is_some_and(|newest| matches!(newest.state, State::Tracking { .. }))
     }
 
-    /// The board as it is tracked now, for a camera on the tip; `None` while it is not known where it is.
+    /// The board as tracked now, for a camera on the tip; `None` while its place is not known.
     pub(crate) fn board_in_view(&self) -> Option<BoardInView> {
         let inner = self.inner();
         let setup = &inner.by.as_ref()?.setup;
@@ -94,7 +95,7 @@ impl FollowLine {
         })
     }
 
-    /// What the arm is to do from its next pass on.
+    /// What the arm should do from its next pass on.
     pub fn begin(&self, request: FollowRequest) {
         let mut inner = self.inner();
         inner.aim = Some(Aim::Wished(request));
@@ -113,12 +114,12 @@ impl FollowLine {
         self.inner().ended.take()
     }
 
-    /// How it goes, when that is news.
+    /// The status, if it has changed.
     pub fn take_status(&self) -> Option<FollowStatus> {
         self.inner().status.take()
     }
 
-    /// What the arm is to do in a pass.
+    /// What the arm should do in a pass.
     pub(crate) fn request(&self, moment: &FollowMoment) -> ArmRequest {
         let mut inner = self.inner();
         if inner.waits(moment) {
@@ -147,7 +148,7 @@ impl FollowLine {
 }
 
 impl Inner {
-    /// Whether the arm stands until the board is seen.
+    /// Whether the arm is at rest until the board is seen.
     fn waits(&mut self, moment: &FollowMoment) -> bool {
         let until_s = *self.waits_until_s.get_or_insert(moment.sim_time_s + self.patience_s);
         let is_fresh = self.newest.as_ref().is_some_and(|newest| {
@@ -156,7 +157,7 @@ impl Inner {
         matches!(self.aim, Some(Aim::Wished(_))) && !is_fresh && moment.sim_time_s < until_s
     }
 
-    /// Whether an arm that was following stands a little longer.
+    /// Whether an arm that was following stays at rest a little longer.
     fn has_patience(&mut self, moment: &FollowMoment) -> bool {
         let since_s = *self.without_goal_since_s.get_or_insert(moment.sim_time_s);
         matches!(self.aim, Some(Aim::Fixed(_))) && (0.0..PATIENCE_S).contains(&(moment.sim_time_s - since_s))
@@ -178,7 +179,7 @@ impl Inner {
                  images are taken and has to keep real time",
                 age = format!("{ahead_s:.1}")
             );
-            // The clock of a simulation that is started again goes back.
+            // The clock of a restarted simulation goes back.
             return Err(if ahead_s > 0.0 { NoGoal::Now(why) } else { NoGoal::Ever(why) });
         }
         let now = self.rest.at().unwrap_or(estimate).carried_to(moment.sim_time_s);

@@ -39,7 +39,7 @@ fn an_arm_that_was_moved_waits_for_the_board_and_then_keeps_the_view_that_it_has
     assert!(goal.base_from_tip.distance_to(&tip).0 < 1e-3);
 }
 
-/// An arm that goes where it is sent comes to rest with its tip, as it really is, over the corner.
+/// An arm that goes where it is commanded comes to rest with its tip, as it really is, over the corner.
 #[test]
 fn an_arm_that_is_off_is_sent_where_its_tip_really_gets_to_the_goal() {
     let arm = sample::corrected_arm();

@@ -1,4 +1,4 @@
-//! The board as it is tracked, and the arm that follows it.
+//! The tracked board, and the arm that follows it.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::text::Text;
 /// Points of the history that is shown: half a minute at the usual rates.
 pub const MAX_TRACK_POINTS: usize = 900;
 
-/// What tracking has brought for one image.
+/// The tracking result for one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracked {
     /// Number of the image, see [`crate::model::FrameInfo::number`].
@@ -25,7 +25,7 @@ pub struct Tracked {
     pub latency_s: f64,
     /// Poses per second.
     pub rate_hz: f64,
-    /// Against where a simulated cell says the board was at the time of the image.
+    /// Compared with where a simulated cell reports the board at the time of the image.
     pub error: Option<TrackError>,
     /// The true pose, where the cell publishes it.
     pub truth: Option<Pose<Base, Target>>,
@@ -34,7 +34,7 @@ pub struct Tracked {
 /// An estimate against the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackError {
-    /// Distance of the board's centre from where it is \[m\].
+    /// Distance of the board's centre from its true place \[m\].
     pub position_m: f64,
     /// Angle between the axes \[rad\].
     pub rotation_rad: f64,
@@ -55,12 +55,12 @@ pub struct TrackPoint {
     pub latency_s: f64,
 }
 
-/// What the arm is to do about the board.
+/// What the arm should do about the board.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum FollowRequest {
     /// Keep the camera where it is relative to the board now.
     KeepView,
-    /// The same; where the arm has no room to go along with the board from there, from the nearest place where it has.
+    /// The same; if the arm has no room to follow the board from there, from the nearest place where it has room.
     KeepViewWithRoom,
     /// Keep the camera at this pose relative to the board.
     KeepPose(Pose<Camera, Target>),
@@ -86,10 +86,10 @@ pub enum FollowStatus {
         distance_m: f64,
         /// Angle between tip and goal \[rad\].
         angle_rad: f64,
-        /// Whether the arm does not go as its goal asks, because it would come too near to something.
+        /// Whether the arm does not go to its goal, because it would come too close to something.
         is_kept_off: bool,
     },
-    /// It stands until the board is seen again.
+    /// It is at rest until the board is seen again.
     Waiting,
     /// It came to rest by itself, and this is why.
     Ended(Text),
@@ -100,12 +100,12 @@ pub enum FollowStatus {
 pub struct TrackState {
     /// Whether images are tracked.
     pub on: bool,
-    /// By what; `None` while they are not.
+    /// The tracker set-up; `None` while nothing is tracked.
     pub by: Option<Arc<TrackedBy>>,
-    /// Whether tip poses, and what the arm is sent, shall be corrected for the errors of the arm; until a person says so they are where
-    /// that brings the tip nearer.
+    /// Whether tip poses and commands should be corrected for the errors of the arm; until the user decides, they are if that
+    /// brings the tip nearer.
     pub wants_corrected: Option<bool>,
-    /// What the arm was asked for.
+    /// What the arm was requested to do.
     pub request: Option<FollowRequest>,
     /// What the arm does.
     pub follow: FollowStatus,
@@ -129,7 +129,7 @@ pub struct BoardMotion {
 }
 
 impl BoardMotion {
-    /// As the cell is asked for it: with the sizes that it takes by itself.
+    /// As a request to the cell: with the sizes that it uses by default.
     pub(crate) fn of_cell(&self) -> cell::BoardMotion {
         cell::BoardMotion::along(self.path, self.speed_m_s)
     }

@@ -15,7 +15,8 @@ pub struct Trail {
 }
 
 impl Trail {
-    /// The tip is at a point of the base now \[m\]. Keeps it where the tip has moved; what is no number is left out.
+    /// The tip is at a point of the base now \[m\]. Keeps it where the tip has moved; values that are not finite are
+    /// ignored.
     pub(crate) fn add(&mut self, point_m: [f64; 3]) {
         let is_same = |last: &[f64; 3]| {
             let square: f64 = last.iter().zip(point_m).map(|(last, now)| (last - now).powi(2)).sum();

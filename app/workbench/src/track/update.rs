@@ -58,7 +58,7 @@ pub(crate) fn set_tracking(model: &mut Model, workers: &Workers, numbers: &mut N
     }
 }
 
-/// What corrects tip poses, and what the arm is sent.
+/// What corrects tip poses and commands.
 fn correcting(model: &Model) -> Option<&Corrected> {
     match model.track.wants_corrected {
         Some(wanted) => corrected(model).filter(|_| wanted).map(|(_, corrected)| corrected),
@@ -66,8 +66,8 @@ fn correcting(model: &Model) -> Option<&Corrected> {
     }
 }
 
-/// Tracks by corrected tip poses, or no longer, where that has become another question: the robot reports again, or another arm. An arm
-/// that follows is left to what it began with.
+/// Switches tracking by corrected tip poses on or off if the situation has changed: the robot reports again, or another arm. An arm
+/// that follows continues as it began.
 pub(crate) fn reconsider_correction(model: &mut Model, workers: &Workers) {
     let corrects = model.track.by.as_ref().is_some_and(|by| by.arm.is_some());
     if model.track.on
@@ -79,7 +79,7 @@ pub(crate) fn reconsider_correction(model: &mut Model, workers: &Workers) {
     }
 }
 
-/// Has the vision thread track with the newest calibration, or no more.
+/// Makes the vision thread track with the newest calibration, or stop tracking.
 pub(crate) fn send_tracking(model: &mut Model, workers: &Workers) {
     let corrected = correcting(model);
     let calibrated = corrected.map_or_else(|| model.calibrated(), |corrected| Some(&corrected.calibrated));
@@ -98,7 +98,7 @@ pub(crate) fn send_tracking(model: &mut Model, workers: &Workers) {
 
 fn tracked(model: &mut Model, tracked: Arc<Tracked>) {
     let track = &mut model.track;
-    // What was on its way when tracking was ended.
+    // It was on its way when tracking ended.
     if !track.on {
         return;
     }
@@ -151,7 +151,7 @@ fn set_follow(model: &mut Model, workers: &Workers, numbers: &mut Numbers, reque
     }
 }
 
-/// Following goes on. What was on its way when it ended says nothing now.
+/// Following continues. What was on its way when it ended is ignored.
 fn follow_goes(model: &mut Model, numbers: &Numbers, status: FollowStatus) {
     if numbers.follow.is_some() {
         model.track.follow = status;

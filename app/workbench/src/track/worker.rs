@@ -1,4 +1,4 @@
-//! Tracking the board in live images: every image becomes a pose of the board, for who watches and for the arm.
+//! Tracking the board in live images: every image becomes a pose of the board, for display and for the arm.
 
 use std::sync::Arc;
 
@@ -22,13 +22,14 @@ pub struct TrackedBy {
 }
 
 impl TrackedBy {
-    /// Where the tip is when it is reported there with these joint values; `None` where these are needed and are not of the arm.
+    /// Where the tip is when it is reported there with these joint values; `None` if these are needed and do not belong to the
+    /// arm.
     pub fn base_from_tip(&self, reported: Pose<Base, Tip>, joints_rad: &JointValues) -> Option<Pose<Base, Tip>> {
         self.arm.as_ref().map_or(Some(reported), |arm| arm.actual(joints_rad).ok())
     }
 
-    /// What to command so that the tip gets there, by what it is off at these joint values: nearby it is off by the same, so that an arm
-    /// that comes to rest there is where it shall be. `None` as for [`Self::base_from_tip`].
+    /// What to command so that the tip gets there, given its error at these joint values: nearby the error is the same, so an arm
+    /// that comes to rest there is in the right place. `None` as for [`Self::base_from_tip`].
     pub(crate) fn command(&self, goal: Pose<Base, Tip>, joints_rad: &JointValues) -> Option<Pose<Base, Tip>> {
         let Some(arm) = &self.arm else { return Some(goal) };
         let actual_from_reported = arm.actual(joints_rad).ok()?.inverse() * arm.arm.forward(joints_rad).ok()?;
@@ -43,7 +44,7 @@ pub struct TrackedImage<'a> {
     /// When it arrived.
     pub received_s: f64,
     pub image: Image<'a>,
-    /// Where the board was, if the cell publishes it; only ever compared with.
+    /// Where the board was, if the cell publishes it; only used for comparison.
     pub base_from_target_true: Option<Pose<Base, Target>>,
 }
 
@@ -56,7 +57,7 @@ pub struct Tracking {
 }
 
 impl Tracking {
-    /// Begins; what is seen goes to `line` at once.
+    /// Starts; what is seen goes to `line` at once.
     ///
     /// # Errors
     /// As [`Tracker::new`].

@@ -1,4 +1,4 @@
-//! How threads hand something to each other. Whoever hands it on never waits.
+//! How threads hand something to each other. The sender never waits.
 //!
 //! | | |
 //! | --- | --- |
@@ -13,8 +13,8 @@ use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 
 use super::shared::Busy;
 
-/// Holds the newest value only. A value that nobody took before the next one came is dropped and counted: a slow
-/// window shows fewer images, never old ones, and the one who puts never waits.
+/// Holds the newest value only. A value that was not taken before the next one came is dropped and counted: a slow
+/// window shows fewer images, never old ones, and the sender never waits.
 #[derive(Debug)]
 pub(crate) struct LatestSlot<T> {
     inner: Mutex<Inner<T>>,
@@ -33,7 +33,7 @@ impl<T> Default for LatestSlot<T> {
 }
 
 impl<T> LatestSlot<T> {
-    /// Puts a value in the place of the one before.
+    /// Replaces the previous value.
     pub fn put(&self, value: T) {
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         let replaced = inner.newest.replace(value);
@@ -43,7 +43,7 @@ impl<T> LatestSlot<T> {
         drop(replaced);
     }
 
-    /// Takes the newest value, unless it was taken already, and the number of values that nobody ever took.
+    /// Takes the newest value, unless it was taken already, and the number of values that were never taken.
     pub fn take(&self) -> Option<(T, u64)> {
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         let newest = inner.newest.take()?;
@@ -56,24 +56,24 @@ impl<T> LatestSlot<T> {
 pub struct Bell(Sender<()>);
 
 impl Bell {
-    /// The bell, and where it is heard.
+    /// The bell, and its receiver.
     pub fn new() -> (Self, Receiver<()>) {
         let (bell, rung) = bounded(1);
         (Self(bell), rung)
     }
 
-    /// Rings; whether anybody is there. One that has rung and was not heard yet rings as well as two.
+    /// Rings; whether the receiver still exists. Two rings before it is heard count as one.
     pub fn ring(&self) -> bool {
         !matches!(self.0.try_send(()), Err(TrySendError::Disconnected(())))
     }
 }
 
-/// A [`LatestSlot`] for a thread that waits for the next value, and wants to know whether the one who puts is there.
+/// A [`LatestSlot`] for a thread that waits for the next value, and wants to know whether the sender is alive.
 #[derive(Debug)]
 pub(crate) struct Tap<T> {
     slot: LatestSlot<T>,
     bell: Bell,
-    /// Bits of the time \[s\] at which the one who puts last had an answer from its source; not a number before.
+    /// Bits of the time \[s\] at which the sender last had an answer from its source; NaN before.
     heard_s: AtomicU64,
 }
 
@@ -106,12 +106,12 @@ impl<T> Tap<T> {
     }
 }
 
-/// The end of a queue at which a thread is asked for something.
+/// The sending end of a queue of requests to a thread.
 #[derive(Debug)]
 pub struct Requests<T>(Option<Sender<T>>);
 
 impl<T> Requests<T> {
-    /// So many may wait; the thread takes them out of the second.
+    /// At most this many may wait; the thread takes them from the second.
     pub fn with_limit(limit: usize) -> (Self, Receiver<T>) {
         let (sender, requests) = bounded(limit);
         (Self(Some(sender)), requests)
@@ -120,17 +120,17 @@ impl<T> Requests<T> {
     /// Asks for something.
     ///
     /// # Errors
-    /// [`Busy`] when too many wait, or nobody takes any.
+    /// [`Busy`] when too many wait, or the receiver is gone.
     pub(crate) fn ask(&self, request: T) -> Result<(), Busy> {
         self.0.as_ref().map_or(Err(Busy), |sender| sender.try_send(request).map_err(|_refused| Busy))
     }
 
-    /// Whether nothing can be asked for any more.
+    /// Whether nothing can be requested any more.
     pub(crate) fn is_closed(&self) -> bool {
         self.0.is_none()
     }
 
-    /// Nothing more is asked for from here: a thread that has done what waits can end.
+    /// Nothing more is requested from here: a thread that has done what waits can end.
     pub(crate) fn close(&mut self) {
         self.0 = None;
     }
@@ -149,7 +149,7 @@ impl<T> Clone for Requests<T> {
     }
 }
 
-/// Counts what is asked for and up to where it is done. What is asked for while it is being done is not lost.
+/// Counts requests and up to which one they are done. A request made while an earlier one is being done is not lost.
 #[derive(Debug, Default)]
 pub(crate) struct Counter {
     asked: AtomicU64,
@@ -157,12 +157,12 @@ pub(crate) struct Counter {
 }
 
 impl Counter {
-    /// Asks once more; returns the number of it.
+    /// Adds a request; returns its number.
     pub fn ask(&self) -> u64 {
         self.asked.fetch_add(1, Ordering::AcqRel) + 1
     }
 
-    /// How often it was asked for.
+    /// How many requests were made.
     pub fn asked(&self) -> u64 {
         self.asked.load(Ordering::Acquire)
     }

@@ -25,14 +25,14 @@ use handeye_wording::text;
 /// Width and height of the fake images in pixels.
 pub const SIZE: (u32, u32) = (64, 48);
 
-/// What becomes of the motions of the fake cell.
+/// What happens to the motions of the fake cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FakeMotions {
     /// They are over at once.
     Arrive,
-    /// They are not begun, for this reason; nor are jogs. Otherwise a jog goes on for as long as it is held.
+    /// They are not begun, for this reason; nor are jogs. Otherwise a jog continues for as long as it is held.
     Refuse(Text),
-    /// They go on until they are cancelled.
+    /// They continue until they are cancelled.
     Hang,
 }
 
@@ -43,7 +43,7 @@ pub struct Script {
     pub refusals: Vec<PortError>,
     /// Connections break at the next call while this is set.
     pub broken: bool,
-    /// Number of images to deliver before time stands still.
+    /// Number of images to deliver before time is paused.
     pub frames_left: u64,
     /// Images delivered.
     pub frames: u64,
@@ -53,7 +53,7 @@ pub struct Script {
     pub stops: u32,
     /// Why stops and starts are refused.
     pub refuse_tasks: Option<PortError>,
-    /// What becomes of motions.
+    /// What happens to motions.
     pub motions: FakeMotions,
     /// Whether there is room to follow.
     pub room: Room,
@@ -61,23 +61,23 @@ pub struct Script {
     pub views: Result<Vec<JointValues>, Text>,
     /// The arm as guided capture drives it.
     pub robot: Result<Robot, Text>,
-    /// What the arm was told to keep out of.
+    /// What the arm was requested to keep out of.
     pub keep_out: Surroundings,
     /// Motions that were begun.
     pub moved: Vec<MotionGoal>,
     /// Jogs and steps that were begun.
     pub jogged: Vec<JogRequest>,
-    /// How the board was told to move.
+    /// How the board was requested to move.
     pub board: BoardMotion,
-    /// Whether it was told to hide.
+    /// Whether it was requested to hide.
     pub board_hidden: bool,
-    /// Lines that it says whenever it is asked.
+    /// Lines that it returns whenever it is asked.
     pub lines: usize,
     /// How often it was asked for them.
     pub asked_for_lines: usize,
 }
 
-/// A cell that tests control. Clones are the same cell.
+/// A cell under the test's control. Clones are the same cell.
 #[derive(Clone)]
 pub struct FakeCell {
     script: Arc<Mutex<Script>>,
@@ -240,7 +240,7 @@ impl ControlPort for FakeCell {
 }
 
 impl FakeCell {
-    /// Ends as the script says; `goes_on` tells whether a motion that hangs is still wanted.
+    /// Ends as scripted; `goes_on` returns whether a motion that hangs is still wanted.
     fn end_of_motion(
         &self,
         begun: impl FnOnce(&mut Script),

@@ -1,4 +1,4 @@
-//! Reading and writing that has to do with one click: images of a capture, folders, exports, pose files.
+//! Reading and writing that belongs to one click: images of a capture, folders, exports, pose files.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ use crate::text::Text;
 use crate::{export, keep_out, messages, session, taught};
 use handeye_wording::text;
 
-/// What can be asked for.
+/// What can be requested.
 pub enum FileTask {
     /// The images of a capture.
     Review {
@@ -58,7 +58,7 @@ pub enum FileTask {
         /// Where.
         file: PathBuf,
         text: String,
-        /// Whether a person waits for it to be reported.
+        /// Whether the user waits for it to be reported.
         is_wished: bool,
     },
     /// Write a board for a printer.
@@ -163,7 +163,7 @@ fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<
     let rgb = session.load_rgb(capture)?;
     let depth = session.load_depth_m(capture)?;
     let coloured = |metres: DepthImage| {
-        // A recorded depth has its far plane in it: nothing lies behind.
+        // A recorded depth has its far plane in it: nothing is behind it.
         let far_plane_m = metres.metres.iter().copied().filter(|m| m.is_finite()).fold(0.0, f32::max).max(1e-3);
         let range_m = depth::range_of(&metres, far_plane_m, None).unwrap_or([0.0, far_plane_m]);
         Ok::<_, Text>(ColouredDepth::new(metres, colours, range_m, far_plane_m)?)
@@ -171,7 +171,7 @@ fn images(folder: &Path, capture: &CaptureRecord, colours: ColourMap) -> Result<
     Ok(FrameImages { rgb, depth: depth.map(coloured).transpose()? })
 }
 
-/// Has a program show a folder, until the program ends; says where the folder is when there is none.
+/// Has a program show a folder, until the program ends; reports where the folder is if there is none.
 fn open_folder(folder: PathBuf, show: impl FnOnce(&Path) -> io::Result<()> + Send + 'static, outlet: &Outlet) {
     if !folder.is_dir() {
         let message = text!("{folder} is not there yet: it is made with the first capture", folder = folder.display());
@@ -213,7 +213,7 @@ fn list(folder: PathBuf) -> FolderListing {
     FolderListing { folder, entries }
 }
 
-/// What a folder is to this program.
+/// What kind of folder it is.
 pub fn kind_of(folder: &Path) -> FolderKind {
     if Session::is_session(folder) {
         FolderKind::Session
@@ -250,7 +250,7 @@ mod tests {
     use crate::command::Event;
     use crate::text::Language;
 
-    /// What is reported until nobody is left who could say something.
+    /// Collects reports until all senders are gone.
     fn message(folder: &Path, is_shown: bool) -> Vec<String> {
         let show = move |_: &Path| if is_shown { Ok(()) } else { Err(io::Error::other("no program")) };
         let (events, reported) = crossbeam_channel::bounded(4);

@@ -1,4 +1,4 @@
-//! The life of a worker: connect, work, and when the connection breaks, connect again, until it is told to end.
+//! The life of a worker: connect, work, and when the connection breaks, connect again, until it is requested to end.
 
 use std::time::Duration;
 
@@ -13,12 +13,12 @@ use crate::text::Text;
 use crate::{connect, messages};
 use handeye_link::{Cell, Connected, PortError};
 
-/// What a worker is asked for.
+/// A request to a worker.
 #[derive(Debug)]
 pub enum Request<Task> {
     /// Try to connect now.
     Reconnect,
-    /// Something that the worker is there for.
+    /// A request for what the worker does.
     Do(Task),
 }
 
@@ -26,10 +26,10 @@ pub enum Request<Task> {
 #[derive(Clone)]
 pub struct Outlet {
     /// Changes of state, in order. A window that does not look (it may be hidden, or busy with a frame) makes the worker
-    /// wait here once the channel is full. That of the control worker is never full: a stop waits for no window. The channel
-    /// closes when the application ends.
+    /// wait here once the channel is full. That of the control worker is never full: a stop never waits for the window. The
+    /// channel closes when the application ends.
     pub events: Sender<Event>,
-    /// Tells the window to look.
+    /// Wakes the window.
     pub waker: Waker,
     /// The application's clock.
     pub clock: Clock,
@@ -45,7 +45,7 @@ impl Outlet {
         (self.waker)();
     }
 
-    /// Tells the user something.
+    /// Notifies the user.
     pub(crate) fn notice(&self, severity: Severity, text: Text) {
         self.report(messages::Event::Notice { severity, text });
     }
@@ -60,7 +60,7 @@ impl Outlet {
 pub trait Duty: Send {
     /// The connection that it works with.
     type Port;
-    /// What it can be asked for.
+    /// What can be requested of it.
     type Task: Send;
     /// Which connection it is.
     const LINK: Link;
@@ -77,19 +77,19 @@ pub trait Duty: Send {
     /// Whatever comes back ends the connection.
     fn turn(&mut self, port: &mut Self::Port, outlet: &Outlet) -> Result<Duration, PortError>;
 
-    /// Does what was asked for; `None` for the port while there is no connection.
+    /// Carries out a request; `None` for the port while there is no connection.
     ///
     /// # Errors
-    /// Whatever comes back ends the connection; a cell that says no is the user's business and is told as a notice.
+    /// Whatever comes back ends the connection; a refusal by the cell is shown to the user as a notice.
     fn perform(&mut self, port: Option<&mut Self::Port>, task: Self::Task, outlet: &Outlet) -> Result<(), PortError>;
 }
 
-/// A worker with all that it needs.
+/// A worker with everything that it needs.
 pub struct LinkLoop<'a, D: Duty> {
     /// What it does.
     pub duty: D,
     pub connector: &'a dyn Cell,
-    /// What it is asked for; closed when the application ends.
+    /// Its requests; closed when the application ends.
     pub requests: Receiver<Request<D::Task>>,
     /// Where it reports to.
     pub outlet: Outlet,

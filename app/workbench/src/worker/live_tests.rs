@@ -20,7 +20,7 @@ use super::*;
 use crate::model::{Axis, JogFrame, Link, LinkState, MotionGoal, MotionOutcome};
 use crate::text::Language;
 
-/// Only a failure takes so long.
+/// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_mins(1);
 
 struct Live {
@@ -145,7 +145,7 @@ fn nothing_moves_while_the_simulation_rests_and_the_reason_is_told() {
     live.watch.sim().stop_simulation().expect("a call");
     while live.watch.sim().get_simulation_state().expect("a call") != SimulationState::Stopped {}
     live.bench.move_to(1, MotionGoal::Joints([0.0; 6].into()), 1.0);
-    // No other pose would go better: a sequence ends with it.
+    // No other pose would work better: a sequence ends with it.
     let MotionOutcome::Failed(why) = live.bench.moved(1) else { panic!("it did not fail") };
     assert!(why.in_language(Language::English).contains("stopped"), "{why:?}");
     live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 0.5, None);
@@ -303,14 +303,15 @@ fn a_server_that_ends_between_two_calls_is_noticed_at_once() {
 mod slow {
     use super::*;
 
-    /// From a stop to an arm at rest, by the clock of the cell \[s\], on a machine that has time for it.
+    /// From a stop to an arm at rest, by the clock of the cell \[s\], on a machine that is not busy.
     const AT_REST_S: f64 = 0.3;
 
-    /// How many stops by the workbench. After every third one, another client asks the cell for it: what differs among those is how late a stop
-    /// is on a machine that is busy with other things.
+    /// How many stops by the workbench. After every third one, another client requests a stop from the cell: the differences among
+    /// those show how late a stop is on a machine that is busy with other things.
     const STOPS: usize = 100;
 
-    /// As the window moves the built-in cell. From twice of it the arm needs those 0.3 s to brake as hard as it may.
+    /// As the window moves the built-in cell. From twice this speed the arm needs those 0.3 s to brake as hard as it
+    /// may.
     const SPEED: f64 = 0.5;
 
     impl Live {
@@ -332,7 +333,7 @@ mod slow {
             }
         }
 
-        /// When the arm has last moved, once it has stood for ten passes.
+        /// When the arm last moved, once it has been at rest for ten passes.
         fn last_moved_s(&mut self) -> f64 {
             let (mut moved_s, mut joints) = self.seen();
             loop {
@@ -347,8 +348,8 @@ mod slow {
         }
     }
 
-    /// The worst frame is one that does not end: nobody takes in here what the workers report, draws, or takes note of a
-    /// stop before the arm stands.
+    /// The worst frame is one that does not end: nothing here takes in what the workers report, draws, or handles a stop
+    /// before the arm is at rest.
     #[test]
     fn a_stop_at_any_instant_brings_the_arm_to_rest_in_time_while_the_window_is_in_a_frame() {
         let mut live = Live::new(true);
@@ -385,7 +386,7 @@ mod slow {
             }
             let number = stop.press_outside();
             took.push(live.last_moved_s() - pressed_s);
-            // What the window still asks for was asked for before the stop.
+            // What the window still requests was requested before the stop.
             let stood = live.joints();
             live.bench.move_to(1000 + trial, MotionGoal::Joints(start), 1.0);
             live.bench.workers.hold_jog(Jog::Joint { index: 0, forward: true }, 1.0, None);

@@ -1,4 +1,4 @@
-//! The threads behind the window. All but `vision` own one connection to the cell and make it again when it breaks.
+//! The threads behind the window. All but `vision` own one connection to the cell and re-establish it when it breaks.
 //!
 //! | thread | does | reports through |
 //! | --- | --- | --- |
@@ -8,7 +8,7 @@
 //! | `vision` | board in the newest image, captures | events; newest [`LiveDetection`]; [`Measured`] |
 //!
 //! What happens once travels as an [`Event`] in a bounded channel. What is only of interest while it is new (images,
-//! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] tells it to look.
+//! robot state) waits in a [`LatestSlot`]. Nothing here knows the window: a [`Waker`] wakes it.
 
 pub mod channels;
 pub(crate) mod files;
@@ -72,13 +72,13 @@ use link::{Duty, LinkLoop, Outlet};
 use reconnect::Reconnect;
 use vision::{Vision, VisionSlots};
 
-/// The application's end of the workers.
+/// The application's side of the workers.
 pub(crate) struct Workers {
     control: Requests<Request<ControlTask>>,
     camera: Requests<Request<CameraTask>>,
     motion: Requests<Request<MotionLook>>,
     vision: Requests<VisionTask>,
-    /// Those of the control worker come last: that the arm was stopped is told after what the stop ended.
+    /// Those of the control worker come last: that the arm was stopped is reported after what the stop ended.
     events: Option<[Receiver<Event>; 2]>,
     stop: Arc<StopLine>,
     desk: Arc<MotionQueue>,
@@ -88,7 +88,7 @@ pub(crate) struct Workers {
     detections: Arc<LatestSlot<LiveDetection>>,
     tracked: Arc<LatestSlot<Tracked>>,
     follow: Arc<FollowLine>,
-    /// Until they end: a cell that it started ends with it.
+    /// Kept until they end: a cell that it started ends with it.
     connector: Option<Arc<dyn Cell>>,
     shutdown: CancelToken,
     threads: Vec<Started>,
@@ -98,7 +98,7 @@ impl Workers {
     /// Starts the threads. What is captured goes to `captures`.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system cannot start more threads.
     pub fn start(
         source: &CellSource,
         view: &ViewSettings,
@@ -109,7 +109,7 @@ impl Workers {
         waker: &Waker,
     ) -> io::Result<Self> {
         let (event_sender, events) = bounded(MAX_EVENTS);
-        // Who stops the arm never waits for the window to look.
+        // The thread that stops the arm never waits for the window.
         let (control_sender, control_events) = unbounded();
         let mut workers = Self::idle([events, control_events], stop, connector, clock, waker);
         let outlet_to = |events: &Sender<Event>| {
@@ -218,25 +218,25 @@ impl Workers {
         }
     }
 
-    /// Asks for a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
+    /// Requests a stop. The request is never lost: it is carried out as soon as the arm can be reached, over the control
     /// worker's connection, whoever moves the arm. A motion or a jog of this program ends as well, and nothing is left
     /// that could begin afterwards.
     pub(crate) fn press_stop(&self) {
         self.stop.press();
     }
 
-    /// What stops the arm, for other threads.
+    /// The stop for the arm, for use by other threads.
     pub fn stop_line(&self) -> &Arc<StopLine> {
         &self.stop
     }
 
-    /// Has the arm keep out of these from its next motion on, also over the next connection.
+    /// Makes the arm keep out of these from its next motion on, also over the next connection.
     pub fn keep_out(&self, keep_out: Arc<Surroundings>) {
         self.desk.keep_out(keep_out);
     }
 
-    /// Asks for a motion. However it ends, [`Moved`](crate::motion::Event::Moved) tells once, also when it is refused
-    /// because something moves already.
+    /// Requests a motion. However it ends, [`Moved`](crate::motion::Event::Moved) is reported once, also when it is
+    /// refused because something moves already.
     ///
     /// # Errors
     /// [`Busy`] when the program ends; then nothing is reported.
@@ -244,7 +244,7 @@ impl Workers {
         self.begin(MotionTask::Move(request))
     }
 
-    /// Asks for one step of a jog at a share of the fastest speed: metres along a line or of a prismatic joint, radians about an
+    /// Requests one step of a jog at a share of the fastest speed: metres along a line or of a prismatic joint, radians about an
     /// axis or of a revolute joint. Reported as [`Self::move_to`].
     ///
     /// # Errors
@@ -260,9 +260,9 @@ impl Workers {
         self.begin(MotionTask::JogStep { id, request: JogRequest { jog, tip_from_camera, speed }, length })
     }
 
-    /// Has the arm follow the board that is tracked, from a place where it has room if that is wished, to which it moves at
-    /// a share of the fastest speed; until [`Self::cancel_motion`], a stop, or the board is lost. Reported
-    /// as [`Self::move_to`]; why it ended by itself is the reason of a motion that failed.
+    /// Makes the arm follow the tracked board, from a place where it has room if that is requested, to which it moves at a
+    /// share of the fastest speed; until [`Self::cancel_motion`], a stop, or the board is lost. Reported as
+    /// [`Self::move_to`]; why it ended by itself is the reason of a motion that failed.
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -270,8 +270,8 @@ impl Workers {
         self.begin(MotionTask::Follow { id, requested, speed })
     }
 
-    /// Asks for poses to look at the board from. [`Planned`](crate::taught::Event::Planned) tells them;
-    /// [`Moved`](crate::motion::Event::Moved), with the same number, why they are not looked for.
+    /// Requests poses from which to look at the board. [`Planned`](crate::taught::Event::Planned) reports them;
+    /// [`Moved`](crate::motion::Event::Moved), with the same number, why they are not planned.
     ///
     /// # Errors
     /// As [`Self::move_to`].
@@ -279,7 +279,7 @@ impl Workers {
         self.begin(MotionTask::Plan { id, request: Box::new(request) })
     }
 
-    /// Asks for the next pose of a guided sequence. [`Chosen`](crate::guided::Event::Chosen) tells it;
+    /// Requests the next pose of a guided sequence. [`Chosen`](crate::guided::Event::Chosen) reports it;
     /// [`Moved`](crate::motion::Event::Moved), with the same number, why it is not chosen.
     ///
     /// # Errors
@@ -293,9 +293,9 @@ impl Workers {
         self.desk.cancel(self.now_s());
     }
 
-    /// A jog button is held now: to be called when it is pressed, and again and again while it is held, or the arm
-    /// stops by itself after [`HELD_S`]. [`JogEnded`](crate::motion::Event::JogEnded) tells that the arm stands: when the
-    /// jog ends, and once more when a button is let go that had been held for longer.
+    /// A jog button is held now: to be called when it is pressed, and repeatedly while it is held, or the arm stops by
+    /// itself after [`HELD_S`]. [`JogEnded`](crate::motion::Event::JogEnded) reports that the arm is at rest: when the
+    /// jog ends, and once more when a button is released that had been held for longer.
     pub(crate) fn hold_jog(&self, jog: Jog, speed: f64, tip_from_camera: Option<Pose<Tip, CameraFrame>>) {
         let request = JogRequest { jog, tip_from_camera, speed };
         if self.desk.hold(request, &self.stop, self.now_s()) {
@@ -327,7 +327,7 @@ impl Workers {
         (self.clock)()
     }
 
-    /// Has every worker without a connection try now.
+    /// Makes every worker without a connection try now.
     ///
     /// # Errors
     /// [`Busy`] when one does not take requests.
@@ -336,7 +336,7 @@ impl Workers {
         self.look_at_connection()
     }
 
-    /// Has no worker try to connect any more until [`Self::reconnect`], where a try starts a program.
+    /// Makes the workers stop trying to connect until [`Self::reconnect`], if a try starts a program.
     ///
     /// # Errors
     /// As [`Self::reconnect`].
@@ -379,11 +379,11 @@ impl Workers {
         self.desk.is_busy(self.now_s())
     }
 
-    /// Waits until this program does not move the arm and a stop that was asked for is done, but no longer than until
-    /// `end`; whether it is so. What is reported meanwhile is lost: for the end of the program.
+    /// Waits until this program does not move the arm and a requested stop is done, but no longer than until `end`;
+    /// whether that is reached. What is reported meanwhile is lost: for the end of the program.
     pub(crate) fn come_to_rest(&self, end: Instant) -> bool {
         loop {
-            // A worker whose reports nobody takes would wait, and the arm go on.
+            // A worker whose reports are not taken would wait, and the arm would keep moving.
             self.drain(|_lost| {});
             if !self.is_moving() && !self.stop.is_pressed() {
                 return true;
@@ -394,7 +394,7 @@ impl Workers {
     }
 
     /// Ends the threads: calls under way are cancelled, channels closed, threads joined. A thread that does not end
-    /// within the deadline is left alone, so that the program can end; returns how many there are.
+    /// within the deadline is abandoned, so that the program can end; returns how many there are.
     pub(crate) fn shut_down(&mut self, deadline: Duration) -> usize {
         self.shutdown.cancel();
         self.stop.lead_away_from(&self.desk);

@@ -1,4 +1,4 @@
-//! The motion worker with a cell that does as it is told.
+//! The motion worker with a cell that obeys.
 
 use handeye_arm::JointValues;
 use std::sync::Mutex;
@@ -15,10 +15,10 @@ use crate::text::{Language, Text};
 use crate::track::worker::TrackedBy;
 use crate::{connect, messages, motion, taught, track};
 
-/// A healthy worker answers within milliseconds; this is for a machine that does something else.
+/// A healthy worker answers within milliseconds; this is for a machine that is busy.
 const PATIENCE: Duration = Duration::from_mins(1);
 
-/// Workers, what they said, and a clock that the test moves.
+/// Workers, what they reported, and a clock that the test moves.
 pub(super) struct Bench {
     pub workers: Workers,
     woken: Receiver<()>,
@@ -54,7 +54,7 @@ impl Bench {
         *self.now_s.lock().unwrap_or_else(PoisonError::into_inner) = now_s;
     }
 
-    /// Collects events until one is as wanted; the next call goes on after it.
+    /// Collects events until one matches; the next call continues after it.
     pub fn until<T>(&mut self, what: &str, wanted: impl Fn(&Event) -> Option<T>) -> T {
         let deadline = Instant::now() + PATIENCE;
         loop {
@@ -160,7 +160,7 @@ fn fake(motions: FakeMotions) -> (FakeCell, Bench) {
     (cell, bench)
 }
 
-/// Waits until the cell has begun so many motions and jogs.
+/// Waits until the cell has begun this many motions and jogs.
 fn begun(cell: &FakeCell, count: usize) {
     let deadline = Instant::now() + PATIENCE;
     loop {
@@ -180,7 +180,7 @@ fn the_facts_of_the_cell_are_told_after_connecting() {
     assert!(bench.facts().arm.is_some());
 }
 
-/// The window is in a long frame: nobody takes in what the workers report, and a driver has a lot to say.
+/// The window is in a long frame: nothing takes in what the workers report, and a driver sends many messages.
 #[test]
 fn a_stop_does_not_wait_for_a_window_that_takes_nothing_in() {
     let (cell, bench) = fake(FakeMotions::Arrive);
@@ -204,7 +204,7 @@ fn nothing_begins_between_a_stop_of_another_thread_and_the_note_that_the_window_
     let stop = Arc::clone(bench.workers.stop_line());
     let number = stop.press_outside();
     bench.stopped();
-    // A sequence that goes on, a button that was pressed before.
+    // A sequence that continues, a button that was pressed before.
     bench.move_to(1, HOME, 1.0);
     assert!(matches!(bench.moved(1), MotionOutcome::Refused(_)));
     bench.workers.hold_jog(LEFT, 0.5, None);
@@ -225,7 +225,7 @@ fn what_is_let_go_at_a_page_stands_while_the_window_still_takes_it_for_held() {
     grip.let_go();
     assert_eq!(bench.jog_ended(), None);
     for step in 1..20 {
-        // Frames that take longer than a press holds without a word.
+        // Frames that take longer than a press holds without a report.
         bench.set_clock(f64::from(step));
         bench.workers.hold_jog(LEFT, 0.5, None);
     }

@@ -1,4 +1,4 @@
-//! A thread for long computations of which only the newest is of interest.
+//! A thread for long computations where only the newest matters.
 
 use std::io;
 use std::sync::Arc;
@@ -8,8 +8,8 @@ use handeye_coppeliasim::CancelToken;
 use super::channels::{Bell, LatestSlot};
 use super::started::Started;
 
-/// Runs one job at a time. A job that is handed in takes the place of the one that waits and cancels the one that
-/// runs, so that the answer to the newest question comes as soon as it can.
+/// Runs one job at a time. A submitted job replaces the waiting one and cancels the running one, so that the answer to
+/// the newest question comes as soon as possible.
 pub struct NewestWins<Job> {
     jobs: Arc<LatestSlot<(Job, CancelToken)>>,
     wake: Option<Bell>,
@@ -20,7 +20,7 @@ impl<Job: Send + 'static> NewestWins<Job> {
     /// Starts the thread; `work` is called for one job after the other.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system cannot start more threads.
     pub fn start(name: &str, mut work: impl FnMut(Job, &CancelToken) + Send + 'static) -> io::Result<(Self, Started)> {
         let jobs: Arc<LatestSlot<(Job, CancelToken)>> = Arc::default();
         let (wake, woken) = Bell::new();
@@ -47,12 +47,12 @@ impl<Job: Send + 'static> NewestWins<Job> {
         }
     }
 
-    /// Cancels what runs and what waits.
+    /// Cancels the running and the waiting job.
     pub fn cancel(&self) {
         self.running.cancel();
     }
 
-    /// Cancels, and has the thread end.
+    /// Cancels, and makes the thread end.
     pub fn end(&mut self) {
         self.cancel();
         self.wake = None;

@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-/// Over so many arrivals the rate is measured.
+/// Number of arrivals over which the rate is measured.
 const ARRIVALS: usize = 20;
 
-/// A gap this long \[s\] ends the stream that the rate is measured of.
+/// A gap this long \[s\] restarts the measurement.
 const GAP_S: f64 = 2.0;
 
 /// Arrivals per second, from the times at which they came.

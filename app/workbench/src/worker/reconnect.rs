@@ -1,4 +1,4 @@
-//! From one try to the next: what a connection that comes and goes looks like.
+//! From one try to the next: the states of a connection that comes and goes.
 
 use std::time::Duration;
 
@@ -6,12 +6,12 @@ use crate::model::{CellSource, LinkState};
 use crate::text::Text;
 use handeye_link::PortError;
 
-/// Pauses between tries. A person who starts the simulator waits for the first ones; a machine that is off for the
-/// night should not be bothered more often than the last.
+/// Pauses between tries. The user who starts the simulator waits for the first ones; a machine that is off for the
+/// night should not be contacted more often than the last.
 const PAUSES: [Duration; 4] =
     [Duration::from_millis(250), Duration::from_millis(500), Duration::from_secs(1), Duration::from_secs(2)];
 
-/// Follows one connection. No thread, no clock: the worker says what happened and when.
+/// Follows one connection. No thread, no clock: the worker reports what happened and when.
 #[derive(Debug)]
 pub struct Reconnect {
     source: CellSource,
@@ -21,7 +21,7 @@ pub struct Reconnect {
     lost_since_s: Option<f64>,
     /// There is no next try before the user asks.
     waits_for_user: bool,
-    /// The pause that the cell itself wants.
+    /// The pause that the cell itself requests.
     wanted_pause: Option<Duration>,
 }
 
@@ -42,7 +42,7 @@ impl Reconnect {
         }
     }
 
-    /// The try went well.
+    /// The try succeeded.
     pub fn connected(&mut self, address: String, server: String) -> LinkState {
         self.attempt = 0;
         self.why = None;
@@ -74,7 +74,7 @@ impl Reconnect {
         self.failed(error, now_s)
     }
 
-    /// How long to wait before the next try; `None` until the user asks.
+    /// How long to wait before the next try; `None`: until the user asks.
     pub fn pause(&self) -> Option<Duration> {
         let index = (self.attempt.saturating_sub(1) as usize).min(PAUSES.len() - 1);
         (!self.waits_for_user).then(|| self.wanted_pause.unwrap_or(PAUSES[index]))

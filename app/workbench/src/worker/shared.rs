@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Tells the window that there is something to look at. Called from any thread.
+/// Wakes the window to look for news. Called from any thread.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
 
 /// Seconds since some moment before the workers were started.
 pub type Clock = Arc<dyn Fn() -> f64 + Send + Sync>;
 
-/// Requests that may wait for a worker. A person cannot click faster than it answers, unless it hangs.
+/// Requests that may wait for a worker. The user cannot click faster than it answers, unless it hangs.
 pub(crate) const MAX_REQUESTS: usize = 32;
 
 /// Events that may wait for the window.

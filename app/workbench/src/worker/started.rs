@@ -17,7 +17,7 @@ impl Started {
     /// Starts a thread.
     ///
     /// # Errors
-    /// When the system has no more threads.
+    /// When the system cannot start more threads.
     pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<Self> {
         let (running, done) = bounded(0);
         let handle = Builder::new().name(name.to_owned()).spawn(move || {
@@ -33,7 +33,7 @@ impl Started {
         matches!(self.done.try_recv(), Err(TryRecvError::Empty))
     }
 
-    /// Waits for its end, no longer than until `end`; whether it has ended. One that has not is left alone.
+    /// Waits for its end, no longer than until `end`; whether it has ended. One that has not is abandoned.
     pub fn join_until(self, end: Instant) -> bool {
         let Self { handle, done } = self;
         let name = handle.thread().name().unwrap_or_default().to_owned();

@@ -9,7 +9,7 @@ use crate::model::{Link, LinkState, Severity, Simulation};
 use crate::text::Text;
 use crate::{connect, live, messages, motion};
 
-/// A healthy worker answers within milliseconds; this is for a machine that does something else.
+/// A healthy worker answers within milliseconds; this is for a machine that is busy.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 struct Bench {
@@ -36,7 +36,7 @@ impl Bench {
         Self::start(&CellSource::default(), cell)
     }
 
-    /// Collects events until one is as wanted; the next call goes on after it.
+    /// Collects events until one matches; the next call continues after it.
     fn until(&mut self, what: &str, wanted: impl Fn(&Event) -> bool) -> Event {
         let deadline = Instant::now() + PATIENCE;
         loop {
@@ -238,7 +238,7 @@ fn the_workers_end_within_the_deadline() {
     let mut bench = Bench::built_in(&cell);
     bench.until_link(Link::Camera, "the camera", LinkState::is_connected);
     assert_eq!(bench.workers.shut_down(PATIENCE), 0);
-    // Each thread held the connector; a thread that lived on would still.
+    // Each thread held the connector; a thread that is still alive would still hold it.
     assert_eq!(cell.owners(), 1);
 }
 

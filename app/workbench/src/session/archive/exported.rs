@@ -9,7 +9,7 @@ use handeye_session::JOURNAL;
 use crate::model::exports_of;
 
 /// Whether the folder for exports has a file that is no older than the last change of the session. A folder that cannot
-/// be read has none.
+/// be read counts as empty.
 pub fn is_exported(session: &Path) -> bool {
     is_younger(session).unwrap_or(false)
 }

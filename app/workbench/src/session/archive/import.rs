@@ -1,4 +1,4 @@
-//! A data set becomes a session: its images and poses are copied, and it stays as it is.
+//! A data set becomes a session: its images and poses are copied, and it is left unchanged.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ use crate::session::start;
 use crate::text::Text;
 use handeye_wording::text;
 
-/// How a recording was understood, in the session that it became.
+/// How a recording was interpreted, in the session made from it.
 const IMPORTED: &str = "imported.toml";
 
 impl Archive {
@@ -39,7 +39,7 @@ impl Archive {
         }
     }
 
-    /// The session keeps how the recording was understood.
+    /// The session keeps how the recording was interpreted.
     pub(super) fn import_converted(&mut self, converted: &Converted) {
         let described = converted.folder.path().join(DESCRIPTION);
         let bounds = Bounds::within(converted.folder.path());
@@ -170,7 +170,7 @@ mod tests {
         assert!(!sessions.exists(), "nothing was begun");
     }
 
-    /// Whoever uploads a data set from a browser chooses what its tables say.
+    /// The uploader of a data set chooses what its tables contain.
     #[test]
     fn an_upload_that_names_an_image_outside_of_it_is_refused_by_every_way_and_nothing_is_copied() {
         let home = tempfile::tempdir().expect("a folder");
@@ -217,7 +217,7 @@ mod tests {
             assert!(why.contains("outside of the folder") || why.contains("a path relative"), "{image}: {why}");
             assert!(!sessions.exists(), "nothing was begun");
         }
-        // Somebody at this machine may.
+        // A user at this machine may do it.
         fs::write(upload.join("dataset.toml"), described.replace("POSES", "poses.csv")).expect("written");
         fs::write(upload.join("poses.csv"), format!("{header}../../private.png,0.4,0,0.3,0,0,0,1\n")).expect("written");
         archive.open(&upload, &Bounds::ANYWHERE);

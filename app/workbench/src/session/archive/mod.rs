@@ -25,7 +25,7 @@ use handeye_wording::text;
 
 pub use folders::{free_folder, timestamp, timestamp_rfc3339};
 
-/// What a session begins with.
+/// What a session starts with.
 #[derive(Debug, Clone)]
 pub struct Beginning {
     /// Mode, target, camera, truth.
@@ -35,7 +35,7 @@ pub struct Beginning {
 }
 
 impl Beginning {
-    /// A session without captures, with what is known of the cell here.
+    /// A session without captures, with what is known about the cell here.
     fn within(&self, document: &Document) -> Document {
         let mut document = document.clone();
         document.meta.arm.clone_from(&self.meta.arm);
@@ -48,48 +48,48 @@ impl Beginning {
 /// What the archive can be asked for.
 #[derive(Debug)]
 pub enum ArchiveTask {
-    /// What a session begins with when the first change asks for one. One that was begun here, or of whose cell nothing is known, takes on
+    /// What a session starts with when the first change needs one. One that was started here, or whose cell is not known, adopts
     /// the cell as long as nothing was captured in it.
     Prepare(Box<Beginning>),
-    /// Begin a session in a folder; without one, under the folder of sessions.
+    /// Start a session in a folder; without one, under the folder of sessions.
     New {
         /// Where.
         folder: Option<PathBuf>,
         beginning: Box<Beginning>,
     },
-    /// Go on with a session, or begin one with the images and poses of a data set.
+    /// Continue a session, or start one with the images and poses of a data set.
     Open {
         folder: PathBuf,
-        /// What its files may name.
+        /// What its files may refer to.
         bounds: Bounds,
     },
-    /// Begin a session with the recorded sample that comes with the program.
+    /// Start a session with the recorded sample that comes with the program.
     Sample,
-    /// Begin a session with a recording that was made a data set.
+    /// Start a session from a recording that was converted to a data set.
     Import(Arc<Converted>),
-    /// Go on with the session in a folder, or begin one there when there is none.
+    /// Continue the session in a folder, or start one there if there is none.
     OpenOrNew {
         /// Where.
         folder: PathBuf,
         beginning: Box<Beginning>,
     },
-    /// Go on with a complete copy in another folder.
+    /// Continue with a complete copy in another folder.
     SaveAs(PathBuf),
     /// Change the document.
     Edit(Box<Edit>),
-    /// Take the last change back.
+    /// Undo the last change.
     Undo,
-    /// Make the last change again that was taken back.
+    /// Redo the last undone change.
     Redo,
-    /// Keep a result beside the captures it came from.
+    /// Keep a result next to the captures it came from.
     Result {
-        /// The session that it is of; another one that is open by now does not get it.
+        /// The session that it belongs to; a different one that is open by now does not get it.
         folder: PathBuf,
         result: Box<CalibrationResult>,
     },
-    /// Keep the record of guided capture beside the captures.
+    /// Keep the record of guided capture next to the captures.
     Guided {
-        /// The session that it is of.
+        /// The session that it belongs to.
         folder: PathBuf,
         /// What was proposed, and what came of it.
         record: Box<GuidedRecord>,
@@ -102,7 +102,7 @@ pub struct Archive {
     sessions: PathBuf,
     beginning: Option<Beginning>,
     store: Option<Store>,
-    /// Whether the session that is open was begun by this program, and not opened.
+    /// Whether the open session was started by this program, and not opened.
     is_begun_here: bool,
 }
 
@@ -164,7 +164,7 @@ impl Archive {
         }
     }
 
-    /// Nobody's capture is of another cell, and what a person said of target, mode and poses stays.
+    /// No captures of another cell are involved, and what the user stated for target, mode and poses is kept.
     fn take_on(&mut self, beginning: &Beginning) {
         let Some(document) = self.store.as_ref().map(Store::document) else { return };
         let meta = &document.meta;
@@ -203,7 +203,7 @@ impl Archive {
         self.is_begun_here |= is_created;
     }
 
-    /// A session for what there is to keep.
+    /// A session for what has to be kept.
     fn create(&self, folder: Option<PathBuf>) -> Result<Store, SessionError> {
         let folder = folder.unwrap_or_else(|| free_folder(&self.sessions, &timestamp()));
         let Beginning { meta, taught } = self.beginning.clone().unwrap_or_else(|| Beginning {
@@ -215,7 +215,7 @@ impl Archive {
         Store::create_with(&folder, document)
     }
 
-    /// The session that is open; one is begun when there is something to keep and none is.
+    /// The open session; one is started when there is something to keep and none is open.
     fn store(&mut self) -> Result<&mut Store, SessionError> {
         let store = if let Some(store) = self.store.take() {
             store
@@ -228,7 +228,7 @@ impl Archive {
         Ok(self.store.insert(store))
     }
 
-    /// Goes on with another session, or tells why not and stays with the present one.
+    /// Continues with another session, or reports why not and stays with the present one.
     fn take(&mut self, store: Result<Store, SessionError>, words: impl FnOnce(SessionError) -> Text) {
         match store {
             Ok(store) => {

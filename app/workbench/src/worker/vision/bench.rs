@@ -25,7 +25,7 @@ use crate::model::{
 };
 use crate::{capture, live};
 
-/// A healthy cell answers within milliseconds; this is for a machine that does something else.
+/// A healthy cell answers within milliseconds; this is for a machine that is busy.
 const PATIENCE: Duration = Duration::from_mins(1);
 
 pub fn request(number: u64, frames: u32) -> CaptureRequest {
@@ -38,7 +38,7 @@ pub fn request(number: u64, frames: u32) -> CaptureRequest {
     }
 }
 
-/// A vision thread without a thread: a test puts images in, sets the clock and has it take turns.
+/// A vision worker without a thread: a test puts images in, sets the clock and runs its turns.
 pub struct Table {
     pub vision: Vision,
     pub tap: Arc<Tap<LiveFrame>>,
@@ -84,7 +84,7 @@ impl Table {
         self.turn();
     }
 
-    /// One turn; whether it goes on after it.
+    /// One turn; whether it continues after it.
     pub(crate) fn turn(&mut self) -> bool {
         self.vision.turn().is_ok()
     }
@@ -187,7 +187,7 @@ impl CellBench {
         connect(&self.server)
     }
 
-    /// Asks for a capture and waits for what comes of it.
+    /// Requests a capture and waits for its result.
     pub(crate) fn capture(&mut self, request: CaptureRequest) -> Result<Measured, CaptureRefused> {
         let number = request.number;
         self.workers.ask_vision(VisionTask::Capture(request)).expect("it takes tasks");
@@ -211,7 +211,7 @@ impl CellBench {
         }
     }
 
-    /// Live detections until so many have come.
+    /// Live detections until this many have come.
     pub(crate) fn live(&mut self, count: usize) -> Vec<LiveDetection> {
         let mut found = Vec::new();
         while found.len() < count {
@@ -225,7 +225,7 @@ impl CellBench {
         found
     }
 
-    /// Where the truth says that the corners are, seen from a pose of the tip.
+    /// Where the corners truly are, seen from a pose of the tip.
     pub(crate) fn projected(&self, base_from_tip: &Pose<Base, Tip>) -> Corners {
         let base_from_target: Pose<Base, Target> = self.truth.base_from_target.expect("published");
         let camera: &Intrinsics = &self.truth.intrinsics;
@@ -237,7 +237,7 @@ impl CellBench {
         BOARD.points().into_iter().enumerate().map(project).collect()
     }
 
-    /// Largest distance of the corners of a capture from where the truth says that they are \[px\].
+    /// Largest distance of the corners of a capture from their true positions \[px\].
     pub(crate) fn worst_px(&self, measured: &Measured) -> f64 {
         let truth = self.projected(&measured.base_from_tip);
         measured.corners.iter().map(|corner| (corner.px - truth[corner.index].px).norm()).fold(0.0, f64::max)

@@ -1,9 +1,9 @@
 //! The vision thread: looks for the board in the newest image, and takes captures. It owns no connection; images
 //! come to it from the camera worker through a [`Tap`].
 //!
-//! One image at a time: tasks first, then the capture, which only costs what the images of a scene at rest take to
-//! be compared, then the live search. So whatever is asked for is taken up within one search, and a capture that waits
-//! goes on within one search, however long a search takes.
+//! One image at a time: tasks first, then the capture, which costs no more than comparing the images of a scene at
+//! rest, then the live search. So every request is taken up within one search, and a capture that waits continues
+//! within one search, however long a search takes.
 
 mod search;
 
@@ -42,7 +42,7 @@ pub enum VisionTask {
     Capture(CaptureRequest),
     /// Give up the capture that is under way.
     CancelCapture,
-    /// Track the board, instead of only finding it; `None` does so no more. A capture goes before.
+    /// Track the board, instead of only finding it; `None` ends that. A capture has priority.
     Track(Option<Box<TrackedBy>>),
 }
 
@@ -186,7 +186,7 @@ impl Vision {
     }
 
     fn track(&mut self, by: Option<Box<TrackedBy>>) {
-        // The tracker before takes its leave of the arm first.
+        // The previous tracker signs off from the arm first.
         self.tracking = None;
         let Some(by) = by else { return };
         match Tracking::new(*by, Arc::clone(&self.sights.follow)) {
@@ -237,13 +237,13 @@ impl Vision {
         }
     }
 
-    /// Measures the average of a capture, unless it was given up meanwhile.
+    /// Measures the average of a capture, unless it was cancelled meanwhile.
     fn measure(&mut self) -> Result<(), Ended> {
         let complete = self.capture.as_ref().filter(|capture| capture.sequence.is_complete());
         let Some(number) = complete.map(|capture| capture.sequence.number()) else { return Ok(()) };
         self.tell(CaptureWait::Measuring);
         let measured = self.capture.as_ref().and_then(|capture| capture.sequence.measure(&self.shutdown));
-        // The search for dots or markers may have taken seconds: what was asked for meanwhile comes first.
+        // The search for dots or markers may have taken seconds: requests made meanwhile come first.
         self.take_up_tasks()?;
         if self.capture.as_ref().is_none_or(|capture| capture.sequence.number() != number) {
             return Ok(());
@@ -262,7 +262,7 @@ impl Vision {
         }
     }
 
-    /// Waits for the one who writes captures when that one is behind.
+    /// Waits for the thread that writes captures if that one is behind.
     fn hand_over(&mut self, mut measured: Measured) -> Result<(), Ended> {
         loop {
             match self.measured.send_timeout(measured, CLOCK_PERIOD) {
@@ -277,7 +277,7 @@ impl Vision {
         }
     }
 
-    /// Reports what the capture waits for, or that there is none, when it is news.
+    /// Reports what the capture waits for, or that there is none, if that has changed.
     fn tell_progress(&mut self) {
         match self.capture.as_ref().map(|capture| capture.sequence.state()) {
             Some(Ok(wait)) => self.tell(wait),

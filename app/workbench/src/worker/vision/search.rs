@@ -11,7 +11,7 @@ use image::GrayImage;
 
 use crate::model::{LiveDetection, LiveFrame};
 
-/// What is looked for, and through what.
+/// What is looked for, and the lens.
 #[derive(Debug, Default)]
 pub struct Search {
     pub target: Option<TargetSpec>,
@@ -19,7 +19,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Looks for the board the quick way; `None` while there is no board to look for.
+    /// Looks for the board with the quick search; `None` while there is no board to look for.
     pub fn live(
         &self,
         frame: &LiveFrame,

@@ -76,7 +76,7 @@ fn a_board_of_every_kind_is_found_live_at_its_place() {
         table.put(&image);
         table.turn();
         let (detection, _) = table.detections.take().expect("a detection");
-        // Of a board of many small tags some may be missed; three quarters are plenty for a pose.
+        // Some of a board's many small tags may be missed; three quarters are plenty for a pose.
         let count = detection.corners.expect("it is there").len();
         assert!(4 * count >= 3 * target.points().len(), "{target}: {count}");
         let found = detection.camera_from_target.expect("a pose");

@@ -37,7 +37,7 @@ fn exact_robot(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Captures asked for right after a move command and all the while that the arm is on its way.
+/// Captures requested right after a move command and all the while that the arm is moving.
 fn captured_around_moves(scene: Scene, bound_px: f64) {
     let mut bench = CellBench::start(exact_robot(scene), true);
     let views = views();
@@ -113,8 +113,8 @@ fn averaging_sixteen_images_lowers_corner_noise_as_far_as_whole_levels_allow() {
             "noise {noise_grey}: one image {single:.4} px, sixteen {averaged:.4} px, ratio {ratio:.2} of \
              {expected:.2}; stated {stated:.4?}"
         );
-        // The detector lays its windows again in every image and sums in single precision, which jitters by a thousandth of
-        // a pixel or so. Each scatter has 840 degrees of freedom, 2.4 % of its own.
+        // The detector places its windows again in every image and sums in single precision, which jitters by a thousandth
+        // of a pixel or so. Each scatter has 840 degrees of freedom, 2.4 % of its own.
         let left = (single / expected).hypot(JITTER_PX);
         assert!(averaged < 1.1 * left && ratio < 1.1 * expected, "{averaged} px instead of {left} px");
         for sigma in stated {
